@@ -35,10 +35,10 @@ def test_a_driver_s_file_without_its_class_lists_the_classes(cli, tmp_path, monk
     approve(refused(cli, "search", "cut-in", "--ego", "f.py"), "such")
 
 
-def test_simulate_a_scenario_file_says_what_to_do(cli, tmp_path):
+def test_simulate_reads_a_scenario_file_as_one(cli, tmp_path):
     (tmp_path / "my.yaml").write_text("scenario: my\n", "utf-8")
     err = refused(cli, "simulate", tmp_path / "my.yaml")
-    assert f"bridgegen search {tmp_path / 'my.yaml'}" in err
+    assert "my.yaml" in err
     assert "XML" not in err
 
 

@@ -12,7 +12,7 @@ import pytest
 from bridgegen.pages import page
 from bridgegen.pages.page import Module, ModuleError, bundle, in_order
 
-ENTRIES = (*page.SERVED, "show.js", "runs.js", "suite.js")
+ENTRIES = (*page.SERVED, "show.js", "runs.js", "suite.js", "trial.js")
 OURS = {
     file.name: Module(file.name, file.read_text("utf-8"))
     for file in page.WEB.iterdir()
@@ -298,12 +298,17 @@ def test_a_statement_declares_one_name(module):
 
 def test_every_module_of_ours_is_used():
     needed = {module.name for module in in_order(page.SERVED, page._text)}
-    needed |= {module.name for module in in_order(["show.js", "runs.js", "suite.js"], page._text)}
+    needed |= {
+        module.name
+        for module in in_order(["show.js", "runs.js", "suite.js", "trial.js"], page._text)
+    }
     assert needed == {*OURS} - {"theme.js"}  # a script of its own, in every page
 
 
 @pytest.mark.parametrize(
-    "entries", [page.REPORT, page.SERVED, ("show.js",), ("runs.js",), ("suite.js",)], ids=str
+    "entries",
+    [page.REPORT, page.SERVED, ("show.js",), ("runs.js",), ("suite.js",), ("trial.js",)],
+    ids=str,
 )
 def test_node_reads_what_is_joined(tmp_path, entries):
     node = shutil.which("node")

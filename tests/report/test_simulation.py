@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shlex
 import shutil
 import subprocess
 from importlib.resources import files
@@ -160,8 +161,23 @@ def test_a_drivers_page_says_why_it_replays_only(tmp_path):
     assert "Still" in found["refused"]
 
 
+def test_a_page_says_of_what_else_the_search_s_verdict_is_made(tmp_path):
+    def judged(**options):
+        run = bg.run_search("cut-in", budget=4, triage="none", **options)
+        text = (run.folder / "report.html").read_text("utf-8")
+        found = json.loads(text.split('id="data">')[1].split("</script>")[0])["simulation"]
+        return {name: found["judged"][name] for name in ("alone", "gated", "criteria")}
+
+    own = {"criteria": ["gap: min(gap to any) > 1 m"], "algorithm": "random"}
+    criteria = judged(**own, critical="criteria", out=tmp_path / "criteria")
+    assert criteria == {"alone": False, "gated": True, "criteria": True}
+    assert judged(**own, out=tmp_path / "harm") == {"alone": True, "gated": True, "criteria": True}
+    other = judged(algorithm="random", worse_than="fsm", out=tmp_path / "other")
+    assert other == {"alone": False, "gated": True, "criteria": False}
+
+
 @pytest.mark.browser
-def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(browser, tmp_path):
+def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(browser, cli, tmp_path):
     run = bg.run_search("crossroads-s4", budget=60, keep=2, triage="none", out=tmp_path / "run")
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     asked = []
@@ -183,6 +199,27 @@ def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(brows
     assert conflict["type"] in said
     assert conflict["rule"] in said
     assert f"responsible: {conflict['responsible']}" in said
+    assert f"v_d {metrics['metrics']['v_d']['value']:.4g}" in page.inner_text("#explore")
+    assert "plausible" in page.inner_text("#explore")
+    with page.expect_download() as saved:
+        page.click("text=Save .xosc")
+    metrics_of = {k: v["value"] for k, v in metrics["metrics"].items()}
+    folder = tmp_path / "saved"
+    folder.mkdir()
+    saved.value.save_as(folder / saved.value.suggested_filename)
+    with page.expect_download() as road:
+        page.click("text=Save map")
+    road.value.save_as(folder / road.value.suggested_filename)
+    again = bg.simulate_file(folder / "crossroads-s4.xosc").metrics
+    assert {name: again[name] for name in ("d_min", "v_d", "harm")} == {
+        name: metrics_of[name] for name in ("d_min", "v_d", "harm")
+    }
+    page.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
+    page.click("text=Copy command")
+    page.wait_for_function("window.copied")
+    code, out, err = cli(*shlex.split(page.evaluate("window.copied"))[1:], "--json")
+    assert code == 0, err
+    assert json.loads(out)["metrics"]["v_d"] == metrics_of["v_d"]
     page.select_option("#explore select[aria-label=Driver]", "un-r157")
     page.wait_for_selector(".tried:has-text('un-r157')")
     page.click("#explore summary")

@@ -63,6 +63,10 @@ OnlyMetrics = Annotated[
         autocompletion=completing("metric"),
     ),
 ]
+Fix = Annotated[list[str] | None, declaration("fixed", shown="their defaults")]
+Distribution = Annotated[Path | None, declaration("distribution")]
+Objective = Annotated[str | None, declaration("objective")]
+Critical = Annotated[str | None, declaration("critical")]
 EmptyTrigger = Annotated[str | None, declaration("empty_trigger")]
 Others = Annotated[str | None, declaration("others", shown="the file's")]
 Simulator = Annotated[

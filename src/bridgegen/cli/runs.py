@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bridgegen.base.errors import BridgeGenError, Interrupted
+from bridgegen.base.errors import BridgeGenError, InputError, Interrupted
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
@@ -31,8 +31,8 @@ from bridgegen.cli.run_files import (
     schema,
     with_run_files,
 )
-from bridgegen.engine.options import SearchOptions
-from bridgegen.engine.options.forms import read_names
+from bridgegen.engine.options import CommonOptions, SearchOptions
+from bridgegen.engine.options.forms import read_fixed, read_names, read_terms
 from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
 from bridgegen.simulation.choice import EMBEDDED
 
@@ -304,11 +304,24 @@ def regions(
 @with_map_folder()
 @with_connection_options
 def simulate(
-    file: Annotated[Path, typer.Argument(help="An OpenSCENARIO file (.xosc).")],
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="An OpenSCENARIO file (.xosc); or a catalogue name or the path of a YAML file, of "
+            "which one row is simulated.",
+            autocompletion=completing("scenario"),
+        ),
+    ],
+    fix: common.Fix = None,
+    distribution: common.Distribution = None,
+    road_map: common.RoadMap = None,
+    junction: common.Junction = None,
+    objective: common.Objective = None,
+    critical: common.Critical = None,
     ego: Annotated[
         str | None,
         typer.Option(
-            help="Driver of the ego; the file's by default.",
+            help="Driver of the ego; the file's or the scenario's by default.",
             rich_help_panel=DRIVER,
             autocompletion=completing("driver"),
         ),
@@ -340,9 +353,10 @@ def simulate(
     junit: common.Junit = None,
     as_json: common.Json = False,
 ) -> None:
-    """Simulate one scenario file; print its metrics.
+    """Simulate one scenario; print its metrics.
 
-    Also prints its decisive conflict.
+    Also prints its decisive conflict. Of a logical scenario it is the row with the parameters of
+    --fix, and the others at their defaults, as a search simulates it.
     """
     from bridgegen.cli.terminal.files import conflict_facts, criteria_facts, print_file_result
     from bridgegen.cli.verdict.of_file import FileCriteria
@@ -353,21 +367,32 @@ def simulate(
     criteria = FileCriteria.read(fail_if or (), junit, criterion or ())
     stages = None if ideal is None else split(ideal)
     skipped: list[str] | None = [] if lenient else None
-    result = simulate_file(
-        file,
-        ego=ego,
-        ideal=stages,
-        vehicle=vehicle,
-        others=others,
-        empty_trigger=empty_trigger or "never",
-        time_limit=time_limit,
-        metrics=read_names(metrics),
-        also=criteria.metrics,
-        time_step=dt,
-        skipped=skipped,
-        simulator=common.read_simulator(simulator, simulator_set, connection) or EMBEDDED,
-        criteria=criteria.criteria,
-    )
+    file, runs = Path(scenario), common.read_simulator(simulator, simulator_set, connection)
+    is_logical = file.suffix.lower() in (".yaml", ".yml") or not (file.suffix or file.exists())
+    if is_logical or fix or distribution:
+        from bridgegen.jobs.search.model import simulate_scenario  # takes longer than a file
+
+        if dt is not None or lenient:
+            raise InputError("--dt and --lenient are for one scenario file, as it is")
+        options = CommonOptions(
+            ego=ego, ideal=stages or (), vehicle=vehicle, others=others, time_limit=time_limit,
+            empty_trigger=empty_trigger, fixed=read_fixed(fix, "--fix"), distribution=distribution,
+            road_map=road_map, junction=junction, critical=critical,
+            objective=read_terms(objective, "--objective"), metrics=read_names(metrics),
+            criteria=[one.to_dict() for one in criteria.criteria],
+        )  # fmt: skip
+        result = simulate_scenario(scenario, options, runs or EMBEDDED, criteria.metrics)
+    elif road_map or junction or objective or critical:
+        raise InputError(
+            f"--map, --place, --objective and --critical are for a logical scenario, got {scenario}"
+        )
+    else:
+        result = simulate_file(
+            file, ego=ego, ideal=stages, vehicle=vehicle, others=others,
+            empty_trigger=empty_trigger or "never", time_limit=time_limit,
+            metrics=read_names(metrics), also=criteria.metrics, time_step=dt, skipped=skipped,
+            simulator=runs or EMBEDDED, criteria=criteria.criteria,
+        )  # fmt: skip
     for name in skipped or ():
         print(f"bridgegen: warning: left out: {name}", file=sys.stderr)
     for note in result.notes:

@@ -67,6 +67,7 @@ class Pipeline:
         objective: set by ``choose_objective``.
         metrics: the names of all metrics that are recorded: those requested, and those that the
             objective and the thresholds need; then the margins of criteria, and the baseline's.
+        held: what its rollouts hold besides motion.
         monitor: the pass criteria, of the scenario and of the options.
         cause: the only one that makes a scenario count as critical, if one was requested.
         seeks_causes: whether ``evaluate`` finds causes.
@@ -136,7 +137,7 @@ class Pipeline:
         if self.cause is not None:
             require(self.cause, self.driver, self.runner.vehicle)
         sees, embedded = simulator.detects, self.runner.embedded
-        held = measures.held_by(self.driver, detects=sees)
+        self.held = held = measures.held_by(self.driver, detects=sees)
         named = f"the driver '{self.driver.name}'"
         self.monitor = Monitor(
             joined_criteria(
@@ -392,7 +393,7 @@ class Pipeline:
         rollout = runner.run(X, roads=(roads, rows))
         metrics = self.measure(rollout)
         gate = plausibility(rollout)
-        texts = happened(rollout, may_stop=self._is_protocol)
+        texts = happened(rollout, may_stop=self.is_protocol)
         findings = Findings.of(analyse(rollout), gate.labels, objective.count, texts)
         fit = gate.code == Implausible.NONE if objective.gated else True
         F, ok = objective.F(metrics, self.metrics, fit)
@@ -416,7 +417,7 @@ class Pipeline:
         return replace(found, critical=counts, cause=cause)
 
     @property
-    def _is_protocol(self) -> bool:
+    def is_protocol(self) -> bool:
         """Whether the scenario's own clauses or criteria decide what its ego fails.
 
         Not where criteria stand beside harm: they need not ask for what the scenario is about.

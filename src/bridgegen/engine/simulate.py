@@ -1,10 +1,10 @@
-"""One scenario file, of any origin: read, simulated and measured.
+"""One scenario file, of any origin, or one row of a logical scenario: simulated and measured.
 
 The stages are the pipeline's, without imports of the search: this must start fast.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from bridgegen.assess.conflict.happening import Happening, happened
 from bridgegen.assess.conflict.harm import NEAR_MISS, decisive
 from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.assess.criteria import CriterionResult, Monitor
+from bridgegen.assess.metrics import Need
 from bridgegen.base.errors import FileFormatError, UnknownNameError
 from bridgegen.drivers import STORYBOARD
 from bridgegen.drivers.kinds import NAMES
@@ -40,13 +41,13 @@ from bridgegen.simulation.rollout import STATUS_MESSAGES, Incident, Rollout
 
 @dataclass(frozen=True)
 class FileResult:
-    """The result of one scenario file.
+    """The result of one scenario file, or of one row of a logical scenario.
 
     Attributes:
         driver: of the ego, by name.
         status: "ok", or why there is no result.
         seconds: simulated until the stop trigger fired [s].
-        parameters: the file's numeric parameters.
+        parameters: the file's numeric parameters, or the row's.
         metrics: by name, in the metric's unit; the quantities of the conflict analysis too.
         rollout: the motion, N = 1.
         criteria: the pass criteria, those that the file states among them, with their margins.
@@ -76,6 +77,10 @@ class FileResult:
     def incidents(self) -> tuple[Incident, ...]:
         """The incidents that the simulator itself reported."""
         return self.rollout.incidents.get(0, ())
+
+    def unless(self, unjudged: str) -> "FileResult":
+        """Return the same, not judged for another reason unless there is one already."""
+        return replace(self, unjudged=self.unjudged or unjudged)
 
 
 @checked
@@ -127,7 +132,7 @@ def simulate_file(
     if path.suffix.lower() in (".yaml", ".yml"):
         raise FileFormatError(
             f"{path}: one OpenSCENARIO file (.xosc) is simulated; a YAML file describes many "
-            f"scenarios, and is searched: bridgegen search {path}"
+            f"scenarios, of which 'bridgegen simulate' and bridgegen.model simulate one"
         )
     driver = egos.get(ego, time_limit=time_limit) if ego else None
     if others is not None and others not in egos.OTHERS:
@@ -152,9 +157,7 @@ def simulate_file(
     )
     runs = simulator.around(embedded, scenario)
     held = measures.held_by(embedded.program.driver, detects=simulator.detects)
-    names = (*measures.existing(tuple(measures.METRICS), held), *quantities.MEASURED)
-    asked = tuple(dict.fromkeys((*(metrics or names), *also)))
-    names = quantities.require(asked, held, f"the driver '{embedded.driver}'")
+    names = measured(metrics, also, held, embedded.driver)
     # The cause in the header was found with the file's own drivers and vehicle; it says nothing of
     # others.
     changes = any(iterable is not None for iterable in (ego, ideal, vehicle, others))
@@ -170,21 +173,39 @@ def simulate_file(
     # Ways are planned once: another simulator's roads are files besides.
     made = network if runs is embedded else runs.roads([roads])
     rollout = runs.run(made, np.zeros(1, dtype=np.int64), {})
-    values = quantities.evaluate(rollout, names)[0]
+    return replace(
+        result_of(rollout, names, embedded.driver, monitor, may_stop=bool(stated)),
+        parameters=embedded.parameters,
+        cause=None if changes else _stated_cause(scenario),
+        notes=(*warnings, *(f"{path}: {name}" for name in unknown), *embedded.program.notes),
+    ).unless(_outside(embedded, roads, network, rollout, path.stem))
+
+
+def measured(
+    metrics: Sequence[str] | None, also: Sequence[str], held: Collection[Need], driver: str
+) -> tuple[str, ...]:
+    """Return the names of the metrics to report, all of which exist."""
+    names = (*measures.existing(tuple(measures.METRICS), held), *quantities.MEASURED)
+    asked = tuple(dict.fromkeys((*(metrics or names), *also)))
+    return quantities.require(asked, held, f"the driver '{driver}'")
+
+
+def result_of(
+    rollout: Rollout, names: Sequence[str], driver: str, monitor: Monitor, *, may_stop: bool
+) -> FileResult:
+    """Return the result of a rollout, N = 1, without what it is of."""
     conflicts = analyse(rollout)
+    values = quantities.evaluate(rollout, names)[0]
     return FileResult(
-        driver=embedded.driver,
+        driver=driver,
         status=": ".join([STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]),
         seconds=float(rollout.n_steps[0] - 1) * rollout.time_step,
-        parameters=embedded.parameters,
+        parameters={},
         metrics=dict(zip(names, values.tolist(), strict=True)),
         rollout=rollout,
         conflicts=conflicts,
         criteria=monitor.results(rollout, 0),
-        cause=None if changes else _stated_cause(scenario),
-        notes=(*warnings, *(f"{path}: {name}" for name in unknown), *embedded.program.notes),
-        unjudged=_unjudged(rollout, conflicts, may_stop=bool(stated))
-        or _outside(embedded, roads, network, rollout, path.stem),
+        unjudged=_unjudged(rollout, conflicts, may_stop=may_stop),
     )
 
 

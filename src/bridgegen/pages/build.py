@@ -74,6 +74,7 @@ def build_report(
     notes: Mapping[str, Any],
     view: str = "",
     keep: str = "",
+    simulated: tuple[str, str] = ("", ""),
     regions: Mapping[str, Any] | None = None,
     confirmations: Sequence[Record] = (),
     hashes: Mapping[str, str] | None = None,
@@ -103,6 +104,7 @@ def build_report(
         notes: the algorithm's notes on the run.
         keep: the command line that keeps its failures in a suite.
         view: the command line that shows this run with the motion of every scenario, if any.
+        simulated: see `simulation_payload`.
         regions: the critical ones, in the form of `regions.record`, if they are known.
         confirmations: of its scenarios in other simulators.
         hashes: digests of the run's inputs and results.
@@ -191,7 +193,7 @@ def build_report(
         criteria=judged,
         screened=screened_payload(notes, pipeline.space),
         happening=happening,
-        simulation=simulation_payload(pipeline) if coverage else None,
+        simulation=simulation_payload(pipeline, simulated) if coverage else None,
     )
 
 

@@ -230,6 +230,12 @@ def _page(template: str, modules: tuple[str, ...], title: str, data: str, **more
     )
 
 
+def scripted(entry: str) -> tuple[Markup, Markup]:
+    """Return the script of a module, and its style without the common one."""
+    script, style = bundle([entry], _text)
+    return Markup(script), Markup(style)
+
+
 @cache
 def _bundled(entries: tuple[str, ...]) -> tuple[Markup, Markup]:
     """Return the script and the style of a page."""

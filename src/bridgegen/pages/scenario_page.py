@@ -1,19 +1,26 @@
 """Pages of a logical scenario and of an ontology file, with what happens in sentences."""
 
+import shlex
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from markupsafe import Markup
 
 from bridgegen.base.disk import refuse_other
+from bridgegen.base.errors import InputError
+from bridgegen.base.physics import HARD_BRAKING
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.convert import scenario_of
 from bridgegen.pages import templates
 from bridgegen.pages.build import critical_in_words
-from bridgegen.pages.page import write_page
+from bridgegen.pages.page import scripted, write_page
 from bridgegen.pages.painter import paint
 from bridgegen.pages.payload import script_json
 from bridgegen.pages.picture_payload import pictures_payload
+from bridgegen.pages.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
+from bridgegen.pages.playbacks import nominal_playback
+from bridgegen.pages.simulation_payload import simulation_payload
 from bridgegen.pages.sketch import sketch
 from bridgegen.scenario.language.parameters import Parameter
 from bridgegen.scenario.language.reader import load as load_scenario
@@ -140,8 +147,13 @@ def _place(at: Waypoint) -> str:
     return f"{in_words(at.distance, 'm')} on {lane}{where}{aside}"
 
 
-def write_scenario_page(path: Path, scenario: LogicalScenario) -> None:
+def write_scenario_page(path: Path, scenario: LogicalScenario, name: str) -> None:
     """Write the page of a scenario, whole or not at all.
+
+    Args:
+        path: of the page.
+        scenario: it.
+        name: by which commands know it: of the catalogue, or the path of its file.
 
     Raises:
         StorageError: the file cannot be written.
@@ -165,7 +177,51 @@ def write_scenario_page(path: Path, scenario: LogicalScenario) -> None:
         story=[*story_lines(scenario)],
         parameters=[_parameter(parameter) for parameter in scenario.parameters.values()],
         rules=(*scenario.bounds, *scenario.derived),
+        **_trial(scenario, name),
     )
+
+
+def _trial(scenario: LogicalScenario, name: str) -> dict[str, object]:
+    """Return the player with its sliders for the template, or why there is none."""
+    if scenario.objective.gated:  # as a search has it, see ``scenarios.as_judged``
+        scenario = replace(scenario, road_end="leave")
+    pipeline = Pipeline(scenario, scenario.space())
+    words = ["bridgegen", "simulate", name]
+    driven = [*words, "--ego", pipeline.driver.name]  # a logical scenario always has one
+    simulation = simulation_payload(pipeline, (shlex.join(driven), shlex.join(words)))
+    none: dict[str, object] = {"data": "", "script": "", "player_css": ""}
+    if "refused" in simulation:
+        return none | {"refused": simulation["refused"]}
+    try:
+        playback = nominal_playback(pipeline, scenario.name)
+    except InputError as error:
+        return none | {"refused": str(error)}
+    aim = scenario.objective
+    data = {
+        "live": False,
+        "confirmations": [],
+        "summary": {
+            "critical_distance": None,
+            "hard_braking": HARD_BRAKING,
+            "harm": "harm_any" if aim.count == "any" else "harm",
+            "critical_rule": critical_in_words(aim.rule, aim.count, aim.critical, aim.criteria),
+        },
+        "rows": {
+            "columns": [
+                {"name": parameter.name, "unit": parameter.unit}
+                | {"description": parameter.description, **parameter.kind.labels()}
+                for parameter in scenario.parameters.values()
+            ],
+            "telling": [],
+            "evaluation": [],
+        },
+        "scale": {**SCALE, "road": ROAD_SCALE},
+        "roads": [road_payload(playback)],
+        "kept": [playback_payload(playback, 0, None)],
+        "simulation": simulation,
+    }
+    script, css = scripted("trial.js")
+    return {"data": Markup(script_json(data)), "script": script, "player_css": css}
 
 
 def _parameter(parameter: Parameter) -> list[object]:
@@ -204,7 +260,7 @@ def show_scenario(name_or_path: str, out: Path | None = None) -> Path:
     beside = path.parent if path.suffix in (".yaml", ".yml") else Path()
     out = out or beside / f"{scenario.name}.html"
     refuse_other(out, GENERATOR, "picture")
-    write_scenario_page(out, scenario)
+    write_scenario_page(out, scenario, name_or_path)
     return out
 
 

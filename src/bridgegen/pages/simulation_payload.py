@@ -16,6 +16,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages.packed import deflated
+from bridgegen.pages.storyboard_payload import storyboard_payload
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.simulation.adversary import AdversarySource
 from bridgegen.simulation.embedded import portable
@@ -24,6 +25,8 @@ from bridgegen.simulation.rollout import Rollout
 TRIED = 64
 """Number of random rows that are run first, so that the ways are planned that rows may need."""
 
+FILES = 3
+"""Number of rows whose scenario files are made, to see that they differ in values alone."""
 
 MOST = 450_000
 """Maximum number of characters of the tables: those of the catalogue take 16,000 to 400,000."""
@@ -46,8 +49,14 @@ HARM = {
 """What the page tells by which conflict decides; see `harm`."""
 
 
-def simulation_payload(pipeline: Pipeline) -> dict[str, Any]:
-    """Return what ``simulator.js`` and ``explore.js`` need; or only "refused", why they cannot."""
+def simulation_payload(pipeline: Pipeline, commands: tuple[str, str] = ("", "")) -> dict[str, Any]:
+    """Return what ``simulator.js`` and ``explore.js`` need; or only "refused", why they cannot.
+
+    Args:
+        pipeline: of the scenario.
+        commands: the command line that simulates a row with the driver, and with none named yet;
+            values follow.
+    """
     try:
         _refuse_what_is_not_portable(pipeline)
         space, runner = pipeline.space, pipeline.runner
@@ -76,8 +85,26 @@ def simulation_payload(pipeline: Pipeline) -> dict[str, Any]:
             "types": [kind.label for kind in ConflictType],
             "responsible": [who.label for who in Responsible],
             "rules": [rule.label for rule in Rule],
+            **_verdict(pipeline),
         },
+        "commands": list(commands),
+        "file": storyboard_payload(pipeline, X[:FILES]),
         "unused": [name for name in space.names if name in runner.source.unused_names],
+    }
+
+
+def _verdict(pipeline: Pipeline) -> dict[str, bool]:
+    """Return what the search's verdict on a row depends on besides conflicts.
+
+    "alone": on no pass criteria, thresholds, cause or other driver; "gated": on plausibility;
+    "criteria": whether some are measured.
+    """
+    objective = getattr(pipeline, "objective", None) or pipeline.scenario.objective
+    beside = pipeline.cause is not None or pipeline.baseline is not None
+    return {
+        "alone": objective.rule == "harm" and not beside,
+        "gated": objective.gated,
+        "criteria": bool(pipeline.monitor.names),
     }
 
 

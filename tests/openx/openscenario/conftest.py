@@ -11,7 +11,7 @@ from tests.openx.openscenario.strangers import FILE, changed
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.write import to_xml as roads_to_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
-from bridgegen.openx.openscenario.from_owl.signals import time_of_day
+from bridgegen.openx.openscenario.from_owl.signals import TIME
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.ontology.graph import Individuals
@@ -132,5 +132,5 @@ def plain(folder) -> Path:
     """The same without what the ontology has no words for."""
     return changed(
         folder, ('cloudState="free"', 'fractionalCloudCover="twoOktas"'),
-        (' intensity="0.8"', ""), ("2025-03-20T10:00:00", time_of_day(math.degrees(0.5))),
+        (' intensity="0.8"', ""), ("2025-03-20T10:00:00", TIME.text(math.degrees(0.5))),
     )  # fmt: skip

@@ -253,14 +253,14 @@ def test_an_azimuth_is_a_turn(degrees):
     [(0, "zero"), (0.1, "one"), (12.5, "one"), (50, "four"), (99.9, "seven"), (100, "eight")],
 )
 def test_cloud_cover_in_oktas(percent, oktas):
-    assert weather.cloud_cover(percent) == f"{oktas}Oktas"
+    assert weather.COVER.text(percent) == f"{oktas}Oktas"
 
 
 @pytest.mark.parametrize(
     ("percent", "wetness"), [(0, "dry"), (39.9, "moist"), (40, "wetWithPuddles")]
 )
 def test_wetness_classes(percent, wetness):
-    assert weather.road_wetness(percent) == wetness
+    assert weather.WETNESS.text(percent) == wetness
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_wetness_classes(percent, wetness):
     [(-90, "00:00:00"), (-20, "06:00:00"), (15, "08:00:00"), (50, "12:00:00"), (51, "12:00:00")],
 )
 def test_the_time_of_day_follows_the_sun(altitude, time):
-    assert weather.time_of_day(altitude).endswith(f"T{time}")
+    assert weather.TIME.text(altitude).endswith(f"T{time}")
 
 
 def test_weather_in_the_file_is_what_the_formulas_say(individuals):

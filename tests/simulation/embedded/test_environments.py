@@ -9,7 +9,7 @@ from tests.approval import refuses
 from bridgegen.base.errors import UnsupportedError
 from bridgegen.drivers import _weather_columns as column
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.openx.openscenario.from_owl.signals import time_of_day
+from bridgegen.openx.openscenario.from_owl.signals import TIME
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded.compiler.global_actions import sun_at
 
@@ -118,7 +118,7 @@ def test_the_time_of_day_places_a_sun_of_which_nothing_is_said():
 
 @pytest.mark.parametrize("altitude", [-85.0, -20.0, 0.0, 30.0, 49.0])
 def test_the_sun_stands_where_our_own_files_say_when_it_does(altitude):
-    hours, minutes, seconds = map(int, time_of_day(altitude)[11:].split(":"))
+    hours, minutes, seconds = map(int, TIME.text(altitude)[11:].split(":"))
     elevation, _ = sun_at(hours + minutes / 60 + seconds / 3600)
     assert math.degrees(elevation) == pytest.approx(altitude, abs=0.01)
 

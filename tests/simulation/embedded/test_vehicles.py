@@ -15,7 +15,8 @@ from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.simulate import simulate_file
-from bridgegen.jobs.search.scenario_files import with_vehicle, write_scenario
+from bridgegen.engine.stated import with_vehicle
+from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.openx.openscenario.read import read
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.choice import SimulatorChoice

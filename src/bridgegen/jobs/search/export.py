@@ -20,9 +20,9 @@ from bridgegen.base.errors import (
 from bridgegen.drivers.drivers import CODES
 from bridgegen.drivers.noise import noise_key
 from bridgegen.engine.simulate import simulate_file
+from bridgegen.engine.stated import keyed
 from bridgegen.jobs.search.exported import FOLDER, MINIMAL
 from bridgegen.jobs.search.run import Run
-from bridgegen.jobs.search.scenario_files import keyed
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate

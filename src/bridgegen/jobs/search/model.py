@@ -16,6 +16,7 @@ from bridgegen.base.extras import require
 from bridgegen.engine.domain import outside
 from bridgegen.engine.options import CommonOptions, called_with
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import FileResult, measured, result_of
 from bridgegen.jobs.search.restored import placed
 from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load
 from bridgegen.pages.sketch import sketch
@@ -52,14 +53,54 @@ def model(given: ModelArguments) -> "Model":
     Raises:
         InputError: arguments or files that break a rule.
     """
+    pipeline = _pipeline_of(given)
+    pipeline.choose_objective()
+    return Model(pipeline)
+
+
+def _pipeline_of(given: ModelArguments, *, held: bool = False) -> Pipeline:
+    """Return the pipeline of a scenario; ``held``: every parameter stands at its value."""
     logical = driven_by(load(given.scenario, given.distribution, given.empty_trigger), given.others)
     spec = chosen_objective(logical.objective, given, "one")
     logical = as_judged(replace(logical, objective=spec), spec.gated)
     logical, roads = placed(logical, given.road_map, given.junction)
     space = logical.space(given.axes, given.fixed)
-    pipeline = Pipeline(logical, space, given, road_map=roads, simulator=given.simulator)
-    pipeline.choose_objective()
-    return Model(pipeline)
+    if held:
+        row = space.values(space.row(space.fixed))
+        space = logical.space(given.axes, {name: row[name] for name in space.parameters})
+    return Pipeline(logical, space, given, road_map=roads, simulator=given.simulator)
+
+
+def simulate_scenario(
+    scenario: str | Path,
+    options: CommonOptions,
+    simulator: SimulatorChoice = EMBEDDED,
+    also: Sequence[str] = (),
+) -> FileResult:
+    """Simulate one row of a scenario: parameters that are not fixed stand at their defaults.
+
+    Args:
+        scenario: name in the catalogue, or path of a file.
+        options: ``metrics`` are those to report, all by default.
+        simulator: runs it.
+        also: names of metrics that must be among them.
+
+    Raises:
+        InputError: arguments or files that break a rule, or fixed values that break a constraint.
+    """
+    given = ModelArguments.of(options, scenario=scenario, simulator=simulator)
+    pipeline = _pipeline_of(given, held=True)
+    runner, space = pipeline.runner, pipeline.space
+    driver = runner.embedded.driver
+    names = measured(given.metrics, also, pipeline.held, driver)
+    # Not the row of the space's defaults: that is moved into its limits, by rounding errors.
+    x = space.row(space.fixed)
+    rollout = pipeline.rollout(x[np.newaxis])
+    return replace(
+        result_of(rollout, names, driver, pipeline.monitor, may_stop=pipeline.is_protocol),
+        parameters=runner.facts(x),
+        notes=(*pipeline.scenario.notes, *runner.notes),
+    ).unless("" if rollout.status[0] else outside(runner))
 
 
 @dataclass(frozen=True)

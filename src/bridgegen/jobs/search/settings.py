@@ -26,6 +26,13 @@ DEFAULTS_BEFORE_FIELD: Mapping[str, Any] = {
 CHOSEN = ("objective", "weights", "scale", "objectives", "count", "metrics")
 """The options that are recorded together, under the key ``chosen``."""
 
+OF_DRIVER = ("ego", "ideal")
+OF_ROW = (
+    "distribution", "empty_trigger", "road_map", "junction", "objective", "critical", "others",
+    "vehicle",
+)  # fmt: skip
+"""The options on which the motion of a row depends, besides its values."""
+
 RECORDED_AS: Mapping[str, str] = {
     "settings": "algorithm_settings",
     "road_map": "map",
@@ -128,6 +135,19 @@ class Settings(SearchOptions):
             if option.name != "ego" or self.ego != STORYBOARD.name:
                 words += option.words(getattr(self, option.name))
         return shlex.join([*words, "--out", str(folder)])
+
+    def simulated(self, driver: bool = True) -> str:
+        """Return the command line that simulates a row of the run, without its values.
+
+        Args:
+            driver: whether it names the run's driver; else another one may follow.
+        """
+        words = ["bridgegen", "simulate", self.scenario]
+        for option in options_of(type(self)):
+            of_driver = option.name in OF_DRIVER
+            if option.name in OF_ROW or (of_driver and driver and self.ego != STORYBOARD.name):
+                words += option.words(getattr(self, option.name))
+        return shlex.join(words)
 
 
 def _plain(value: Any) -> Any:

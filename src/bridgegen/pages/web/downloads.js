@@ -3,6 +3,7 @@
 import { element } from "./common.js";
 import { data } from "./data.js";
 import { inflated } from "./inflate.js";
+import { download } from "./save.js";
 
 export function fileLink(name) {
   // Always relative: a path with a scheme or a leading slash cannot lead elsewhere.
@@ -30,7 +31,5 @@ async function bytesOf(name) {
 }
 
 async function save(name, short) {
-  const url = URL.createObjectURL(await bytesOf(name));
-  element("a", { href: url, download: short }).click();
-  setTimeout(() => URL.revokeObjectURL(url), 10000);
+  download(await bytesOf(name), short);
 }

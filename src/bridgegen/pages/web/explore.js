@@ -6,7 +6,9 @@ import { workers } from "./explore_workers.js";
 import { columns, data } from "./data.js";
 import { inflated } from "./inflate.js";
 import { quantity, shareText, turned, worded } from "./numbers.js";
+import { download } from "./save.js";
 import { Simulator } from "./simulator.js";
+import { fileOf, shellWord } from "./storyboard.js";
 import { unpack } from "./unpack.js";
 
 const given = data.simulation;
@@ -67,6 +69,19 @@ function judge(made, simulator, status) {
 
 const labels = given?.judged;
 const harmsAny = data.summary.harm === "harm_any";
+
+// What the search would also look at, and the page does not compute.
+function limits() {
+  const { alone, gated, criteria } = given.judged, beside = criteria && alone ? "pass criteria and " : "";
+  const rule = alone ? "" : `Conflicts only, none of which is called a failure here: in this run critical means ${data.summary.critical_rule}, which the page does not compute. `;
+  return `${rule}Not computed here: ${beside}further metrics${gated ? ", and whether the traffic is plausible (the search leaves implausible rows out)" : ""}.`;
+}
+
+// The metrics that follow from the motion with the bits of the search's.
+function figuresOf({ closest, distance, v }) {
+  if (closest === null) return "";
+  return `d_min ${quantity(distance[closest], "m")}, v_d ${quantity(Math.abs(v[0][closest]), "m/s")}`;
+}
 
 function conflictOf(made, simulator) {
   const best = simulator.decisive(harmsAny);
@@ -144,10 +159,12 @@ export class Explorer {
     this.base = kept;
     if (given.refused) return this.refuse(given.refused);
     this.values = { ...kept.parameters };
+    this.row = null;
     this.driver = given.driver;
     this.sliders = new Map();
     const lines = given.space.filter(({ searched, name }) => searched && !given.unused.includes(name)).map((part) => this.slider(part));
     this.said = element("p", { class: "tried", role: "status" }, "Try other values: move a slider.");
+    this.figures = element("p", { class: "muted small" });
     const button = (text, act, title) => {
       const made = element("button", { type: "button", class: "quiet", title }, text);
       made.addEventListener("click", act);
@@ -158,8 +175,9 @@ export class Explorer {
       element("div", { class: "said" }, this.said, element("div", { class: "presets" },
         ...(drivers.length > 1 ? [this.drivers(drivers)] : []), button("As found", () => this.set(this.base.parameters), "The values of the chosen scenario"),
         button("Defaults", () => this.set(Object.fromEntries(given.space.map((part) => [part.name, part.default]))), "The scenario's own defaults"),
-        button("Copy values", (event) => this.copy(event.currentTarget), "The values, as options of bridgegen search"))),
-      element("div", { class: "sliders" }, ...lines));
+        button("Copy command", (event) => this.copy(event.currentTarget), "The command line that simulates what is shown, to the last bit"), ...this.savers(button))),
+      this.figures, element("div", { class: "sliders" }, ...lines), element("p", { class: "muted small" }, limits()));
+    if (given.file.refused) this.box.append(element("p", { class: "muted small" }, `What is shown is not saved as a file here: ${given.file.refused}.`));
     if (this.sliders.size > 1) this.addMap();
   }
 
@@ -231,22 +249,45 @@ export class Explorer {
 
   tell(made) {
     const seconds = (k) => `${(k * made.time_step).toFixed(2)}\u00a0s`, found = made.conflict;
-    const fails = Boolean(found?.counts && data.summary.harm); // other rules count otherwise, which the page does not know
+    const fails = Boolean(found?.counts && given.judged.alone);
     this.said.classList.toggle("hit", fails);
     const least = made.closest === null ? "" : `; closest ${quantity(made.distance[made.closest], "m")} at ${seconds(made.closest)}`;
     let text = `${this.driver}: no conflict${least}.`;
     if (found) {
       const whom = found.partner ? ` with ${found.partner}` : "", severe = found.conflict === "contact" ? `, MAIS3+ ${shareText(found.severity)}` : "";
       const named = found.conflict === "contact" ? "collision" : found.conflict;
-      text = `${fails ? `${this.driver} FAILS: ` : ""}${named}${whom} at ${seconds(found.instant)}: ${[found.type, found.rule].filter(Boolean).join(", ")}; responsible: ${found.responsible}${severe}${fails || !data.summary.harm ? "" : ". Not counted"}.`;
+      text = `${fails ? `${this.driver} FAILS: ` : ""}${named}${whom} at ${seconds(found.instant)}: ${[found.type, found.rule].filter(Boolean).join(", ")}; responsible: ${found.responsible}${severe}${fails || !given.judged.alone ? "" : ". Not counted"}.`;
       found.sentence = found.bare = text;
     }
     this.said.textContent = text;
+    this.figures.textContent = figuresOf(made);
     this.player.swap(made);
   }
 
-  copy(button) {
-    const row = this.row ?? this.values;
-    copy([...this.sliders.keys()].map((name) => `--fix ${name}=${row[name]}`).join(" "), button);
+  // All values of what is shown, derived ones among them.
+  async shown() {
+    return this.row ?? { ...completed(await simulator(), this.values), ...this.values };
+  }
+
+  async copy(button) {
+    const row = await this.shown(), [own, others] = given.commands;
+    const begun = this.driver === given.driver ? own : `${others} --ego ${shellWord(this.driver)}`;
+    const fixed = given.space.filter(({ name, formula }) => !formula && !given.unused.includes(name));
+    copy([begun, ...fixed.map(({ name }) => `--fix ${shellWord(`${name}=${row[name]}`)}`)].join(" "), button);
+  }
+
+  // Buttons that save the scenario file of what is shown, and the map that it names.
+  savers(button) {
+    const { file } = given;
+    if (file.refused) return [];
+    const save = async () => {
+      const kernels = await simulator(), row = await this.shown(), template = new TextDecoder().decode(await inflated(file.template));
+      if (this.driver !== given.driver && !file.drivers) this.said.textContent = "The file states the ideal stages of the run's own driver: choose that one to save it.";
+      else download(new Blob([fileOf(template, file.holes, (...asked) => kernels.evaluate(...asked), row, this.driver)]), `${file.stem}.xosc`);
+    };
+    return [
+      button("Save .xosc", save, "The scenario file of what is shown, as the search exports it; its map is beside it"),
+      button("Save map", async () => download(new Blob([await inflated(file.road)]), `${file.stem}.xodr`), "The OpenDRIVE file that the scenario file names"),
+    ];
   }
 }

@@ -20,7 +20,7 @@ function paint(canvas) {
   pill(c, { width: scene.clientWidth, height: scene.clientHeight }, `${$("scene-name").textContent}  ${$("clock").textContent}`, 0, 0, palette.ink);
 }
 
-function download(blob, name) {
+export function download(blob, name) {
   const href = URL.createObjectURL(blob);
   element("a", { href, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(href), 10000);

@@ -139,7 +139,7 @@ class Quantities:
             OntologyError: the formula has no finite value there.
         """
         now = self.value(quantity)
-        value = float(_parse(formula).evaluate({"x": now}))
+        value = float(parsed(formula).evaluate({"x": now}))
         if not math.isfinite(value):
             raise OntologyError(f"{formula} must have a finite value, got x = {now!r} ({quantity})")
         if isinstance(quantity, osc.ParameterRef):
@@ -182,7 +182,8 @@ class Quantities:
 
 
 @lru_cache(maxsize=256)
-def _parse(formula: str) -> Expression:
+def parsed(formula: str) -> Expression:
+    """Return a formula, read once."""
     return parse(formula)
 
 

@@ -6,13 +6,13 @@ esmini and others run only these.
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from bridgegen.base import elementary
 from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity
+from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity, parsed
 from bridgegen.openx.openscenario.values import format_double
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import Subject
@@ -186,7 +186,6 @@ ontology knows no direction of wind."""
 CLOUD_COVER = "fractional_cloud_cover"
 ROAD_WETNESS = "road_wetness"
 TIME_OF_DAY = "time_of_day"
-_WET = 40.0  # [%], where the paper's friction formula turns from moist to wet
 
 
 def environment(
@@ -219,22 +218,17 @@ def environment(
         )
     texts: list[osc.ParameterDeclaration] = []
 
-    def declare(text: str, value: str) -> osc.ParameterRef:
+    def declare(text: str) -> osc.ParameterRef | None:
+        law = LAWS[text]
+        if law.part not in found:
+            return None
         own = f"{name}_{text}" if name else text
+        # Strings, also the dateTime: esmini supports no parameters of that type.
+        value = law.text(quantities.value(found[law.part]))
         texts.append(osc.ParameterDeclaration(own, osc.ParameterType.STRING, value))
         return osc.ParameterRef(f"${own}")
 
-    def now(part: str) -> float:
-        return quantities.value(found[part])
-
-    cover = wetness = time = None
-    if "cloudiness" in found:
-        cover = declare(CLOUD_COVER, cloud_cover(now("cloudiness")))
-    if "wetness" in found:
-        wetness = declare(ROAD_WETNESS, road_wetness(now("wetness")))
-    if "sun_altitude_angle" in found:
-        # A string, not a dateTime: esmini supports no parameters of that type.
-        time = declare(TIME_OF_DAY, time_of_day(now("sun_altitude_angle")))
+    cover, wetness, time = map(declare, (CLOUD_COVER, ROAD_WETNESS, TIME_OF_DAY))
     result = osc.Environment(
         name=f"{name}_environment" if name else "environment",
         time_of_day=None if time is None else osc.TimeOfDay(animation=False, date_time=time),
@@ -268,37 +262,62 @@ def _weather(
     return osc.Weather(cover, **made)
 
 
-def cloud_cover(percent: float) -> osc.FractionalCloudCover:
-    """Return the eighths of sky that clouds cover; 0 and 8 mean none and all of it.
+@dataclass(frozen=True)
+class Law:
+    """A text of the weather as a function of the number that it follows from.
 
-    Source: WMO code table 2700.
+    A formula, so that a page, which makes files of other values, has the same one.
+
+    Attributes:
+        part: the number.
+        formula: of ``x``.
+        words: the texts by the formula's value; none: its value is the time of a day [s].
     """
-    eighths = math.floor(percent * 8 / 100 + 0.5)
-    if percent <= 0.0:
-        eighths = 0
-    elif percent >= 100.0:
-        eighths = 8
-    else:
-        eighths = min(max(eighths, 1), 7)
-    return list(osc.FractionalCloudCover)[eighths]
+
+    part: str
+    formula: str
+    words: tuple[str, ...] = ()
+
+    def text(self, x: float) -> str:
+        """Return the text at a number."""
+        value = int(parsed(self.formula).evaluate({"x": x}))
+        if self.words:
+            return self.words[value]
+        return f"{DAY}T{value // 3600:02}:{value // 60 % 60:02}:{value % 60:02}"
 
 
-def road_wetness(percent: float) -> osc.Wetness:
-    """Return the class of a road's wetness [%]: wet from where friction stops falling (40 %)."""
-    if percent <= 0.0:
-        return osc.Wetness.DRY
-    return osc.Wetness.MOIST if percent < _WET else osc.Wetness.WET_WITH_PUDDLES
+DAY = "2025-03-20"
+"""The day behind the paper's azimuth formula; means nothing. ``storyboard.js`` has it, too."""
 
+COVER = Law(
+    "cloudiness",
+    "0 if x <= 0 else 8 if x >= 100 else min(max(floor(x * 8 / 100 + 0.5), 1), 7)",
+    tuple(osc.FractionalCloudCover),
+)
+"""The eighths of sky that clouds cover; 0 and 8 mean none and all of it.
 
-def time_of_day(altitude_deg: float) -> str:
-    """Return when, before noon, the sun stands at an altitude.
+Source: WMO code table 2700.
+"""
 
-    The day is the one behind the paper's azimuth formula (CARLA's ``dynamic_weather.py``):
-    altitude = −20 + 70·sin(t), from −90° at midnight to 50° at noon. Its date means nothing.
-    """
-    phase = elementary.asin(min(max((altitude_deg + 20.0) / 70.0, -1.0), 1.0))
-    seconds = round((phase / math.pi + 0.5) * 12 * 3600)
-    return f"2025-03-20T{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
+WETNESS = Law(
+    "wetness",
+    # 40 %: where the paper's friction formula turns from moist to wet.
+    "0 if x <= 0 else 1 if x < 40 else 2",
+    (osc.Wetness.DRY, osc.Wetness.MOIST, osc.Wetness.WET_WITH_PUDDLES),
+)
+"""The class of a road's wetness [%]: wet from where friction stops falling (40 %)."""
+
+TIME = Law(
+    "sun_altitude_angle",
+    "round((asin(min(max((x + 20) / 70, -1), 1)) / pi + 0.5) * 12 * 3600)",
+)
+"""When, before noon, the sun stands at an altitude [deg].
+
+CARLA's ``dynamic_weather.py``: altitude = −20 + 70·sin(t), from −90° at midnight to 50° at noon.
+"""
+
+LAWS: Mapping[str, Law] = {CLOUD_COVER: COVER, ROAD_WETNESS: WETNESS, TIME_OF_DAY: TIME}
+"""By the name of the declared text."""
 
 
 def _text(quantity: Quantity) -> str | osc.ParameterRef:
