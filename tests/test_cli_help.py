@@ -71,7 +71,7 @@ def test_the_version(cli):
 def test_the_panels_of_the_commands(cli):
     _, out, _ = cli("--help")
     titles = re.findall(r"^(\S.*):$", out, re.MULTILINE)
-    assert titles == ["Options", "Search", "Look at results", "Files", "Ontology", "Advanced"]
+    assert titles == ["Options", *PANELS]
 
 
 def test_the_options_of_a_search_are_in_groups(cli, monkeypatch):

@@ -143,7 +143,7 @@ def _triages(_: typer.Context) -> Iterable[str]:
 def _flavours(_: typer.Context) -> Iterable[str]:
     from bridgegen.jobs.search.export import FLAVOURS
 
-    return FLAVOURS
+    return (*FLAVOURS, "parquet", "video", "xosc")
 
 
 def _fixed(*words: str) -> Callable[[typer.Context], Iterable[str]]:

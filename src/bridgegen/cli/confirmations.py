@@ -14,11 +14,10 @@ from bridgegen.cli.connection import (
     with_connection_options,
     with_map_folder,
 )
-from bridgegen.cli.groups import RESULTS
 from bridgegen.engine.options.option import SIMULATOR
 
 
-@app.command(rich_help_panel=RESULTS)
+@app.command()
 @with_map_folder()
 @with_connection_options
 def confirm(

@@ -4,10 +4,9 @@ import typer
 
 from bridgegen.cli import options
 from bridgegen.cli.app import app
-from bridgegen.cli.groups import ADVANCED
 
 
-@app.command(rich_help_panel=ADVANCED)
+@app.command()
 def doctor(as_json: options.Json = False) -> None:
     """Examine this installation: versions, cache, extras.
 

@@ -9,10 +9,9 @@ import typer
 from bridgegen.cli import options as common
 from bridgegen.cli.app import app, listing
 from bridgegen.cli.completion import completing
-from bridgegen.cli.groups import FILES
 
 
-@app.command(rich_help_panel=FILES)
+@app.command()
 def fit(
     scenario: Annotated[
         str,
@@ -45,7 +44,7 @@ def fit(
         list[str] | None,
         typer.Option(help="A column that is no parameter; may be repeated."),
     ] = None,
-    others: Annotated[
+    without_column: Annotated[
         str | None,
         typer.Option(help="Searched parameters without a column: uniform or default."),
     ] = None,
@@ -68,8 +67,8 @@ def fit(
     with FitProgress() as live:
         fitted, written = write_fit(
             scenario, events, out=out, page=page, xosc=xosc, hours=hours, km=km,
-            ignore=ignore or (), others=others, source=source, replicates=replicates, seed=seed,
-            progress=live.progress, notes=notes,
+            ignore=ignore or (), others=without_column, source=source, replicates=replicates,
+            seed=seed, progress=live.progress, notes=notes,
         )  # fmt: skip
     for note in notes:
         print(f"bridgegen: note: {note}", file=sys.stderr)

@@ -1,5 +1,6 @@
 """Help texts in which commands are listed by panel, and options by group."""
 
+import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -11,10 +12,40 @@ from bridgegen.engine.options.option import GROUPS
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-PANELS = ("Search", "Look at results", "Files", "Ontology", "Advanced")
-"""The panels in which ``bridgegen --help`` lists the commands."""
+PANELS = {
+    "Search": ("demo", "search", "resume", "suite", "diff", "benchmark", "preventability", "risk"),
+    "Look at results": ("open", "analyse", "confirm", "export", "dashboard", "safety-case"),
+    "Files": ("new", "validate", "draw", "simulate", "mine", "fit"),
+    "More": ("list", "ontology", "doctor"),
+}
+"""The commands that ``bridgegen --help`` lists, by panel, in this order."""
 
-SEARCH, RESULTS, FILES, ONTOLOGY, ADVANCED = PANELS
+RENAMED = {
+    "ask": ("ontology", "ask"),
+    "check-driver": ("validate",),
+    "compare": ("benchmark", "algorithms"),
+    "convert": ("export", "--flavour", "xosc"),
+    "coverage": ("analyse", "coverage"),
+    "import": ("ontology", "import"),
+    "junctions": ("list", "places"),
+    "metrics": ("analyse", "recording"),
+    "places": ("list", "places"),
+    "regions": ("analyse", "regions"),
+    "schema": ("validate", "--schema"),
+    "show": ("draw",),
+    "table": ("export", "--flavour", "parquet"),
+    "video": ("export", "--flavour", "video"),
+    "view": ("open",),
+}
+"""Old names of commands, which answer in version 0.1 only, and what they are called now."""
+
+RENAMED_OPTIONS = {
+    "fit": {"--others": "--without-column"},
+    "import": {"--ego": "--entity"},
+    "recording": {"--ego": "--entity"},
+    "suite": {"--map": "--preventability"},
+}
+"""Old spellings of options by command, likewise."""
 
 OTHER = "Options"
 """The group of the options that belong to none of `GROUPS`."""
@@ -31,16 +62,32 @@ class PanelledGroup(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the panels, each command with its summary."""
-        commands = {name: self.commands[name] for name in self.list_commands(ctx)}
-        width = max(len(name) for name in commands)
-        for panel in PANELS:
-            rows = [
-                (name.ljust(width), command.get_short_help_str(formatter.width - width - 4))
-                for name, command in commands.items()
-                if getattr(command, "rich_help_panel", "") == panel
-            ]
+        width = max(len(name) for names in PANELS.values() for name in names)
+        for panel, names in PANELS.items():
+            short = {
+                name: self.commands[name].get_short_help_str(formatter.width - width - 4)
+                for name in names
+            }
             with formatter.section(panel):
-                formatter.write_dl(rows)
+                formatter.write_dl([(name.ljust(width), text) for name, text in short.items()])
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the commands that people see."""
+        return [name for names in PANELS.values() for name in names]
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return a command and its words; those of an old name are the new one's."""
+        if new := RENAMED.get(args[0]):
+            _tell_new(ctx, args[0], f"bridgegen {' '.join(new)}")
+            args = [*new, *(word for word in args[1:] if (args[0], word) != ("schema", "--of"))]
+        return super().resolve_command(ctx, args)
+
+
+def _tell_new(ctx: Any, old: str, new: str) -> None:
+    if not ctx.resilient_parsing:  # a shell that completes expects no message
+        print(
+            f"bridgegen: note: {old} is now '{new}'; the next version has no {old}", file=sys.stderr
+        )
 
 
 class GroupedCommand(TyperCommand):
@@ -52,6 +99,11 @@ class GroupedCommand(TyperCommand):
         Raises:
             InputError: one is given again.
         """
+        renamed = RENAMED_OPTIONS.get(ctx.info_name, {})
+        for place, (old, equals, value) in enumerate(word.partition("=") for word in args):
+            if new := renamed.get(old):
+                args[place] = f"{new}{equals}{value}"
+                _tell_new(ctx, old, new)
         single = {
             spelling: param
             for param in self.params

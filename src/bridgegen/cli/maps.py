@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import app
+from bridgegen.cli.app import listing
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import with_map_folder
-from bridgegen.cli.groups import FILES
 
 if TYPE_CHECKING:
     from bridgegen.jobs.search.places import PlaceFit
 
 
-@app.command(rich_help_panel=FILES)
-@app.command("junctions", hidden=True)
+@listing.command("places")
 @with_map_folder()
 def places(
     road_map: Annotated[
@@ -52,7 +50,7 @@ def places(
     if scenario and not found and not as_json:
         print(
             f"{road_map}: nothing of the kind of place that {scenario} needs; "
-            f"'bridgegen places {road_map}' lists what there is"
+            f"'bridgegen list places {road_map}' lists what there is"
         )
     elif scenario:
         print_table(

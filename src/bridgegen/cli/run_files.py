@@ -16,6 +16,7 @@ import typer
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import BridgeGenError, FileFormatError, InputError, StorageError
+from bridgegen.cli.groups import RENAMED_OPTIONS
 from bridgegen.engine.options import SearchOptions, file_forms, options_of
 from bridgegen.engine.options.file_forms import FileForm
 
@@ -204,7 +205,9 @@ def _read_run(
     values = {}
     for spelling, value in data.items():
         where = document.at((*place, spelling))
-        key = keys.get(spelling)
+        key = keys.get(spelling) or keys.get(
+            RENAMED_OPTIONS["suite"].get(f"--{spelling}", "").removeprefix("--")
+        )
         if key is None:
             hint = nearest(spelling, keys) or f"; known: {', '.join(keys)}"
             problems.append(f"unknown key '{spelling}' in {label}{hint} ({where})")

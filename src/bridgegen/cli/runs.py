@@ -11,7 +11,7 @@ import typer
 
 from bridgegen.base.errors import BridgeGenError, Interrupted
 from bridgegen.cli import options as common
-from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.app import FAILED, analyses, app
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import (
     NO_CONNECTION,
@@ -21,7 +21,6 @@ from bridgegen.cli.connection import (
     with_map_folder,
 )
 from bridgegen.cli.declared import with_declared_options
-from bridgegen.cli.groups import FILES, RESULTS, SEARCH
 from bridgegen.cli.run_files import (
     FiledRun,
     Key,
@@ -103,7 +102,7 @@ def search_all(
         raise typer.Exit(status)
 
 
-@app.command(rich_help_panel=SEARCH)
+@app.command()
 @with_map_folder(WHAT)
 @with_run_files(search_all)
 @with_connection_options
@@ -168,7 +167,7 @@ def run_file_schema() -> dict[str, object]:
     return schema(keys_of(search))
 
 
-@app.command(rich_help_panel=FILES)
+@app.command()
 def new(
     name: Annotated[
         str,
@@ -189,7 +188,7 @@ def new(
     print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
 
 
-@app.command(rich_help_panel=SEARCH)
+@app.command()
 @with_map_folder()
 @with_connection_options
 def resume(
@@ -226,7 +225,7 @@ def resume(
     _end(criteria.judge(run))
 
 
-@app.command(rich_help_panel=RESULTS)
+@analyses.command()
 def coverage(
     run: Annotated[Path, typer.Argument(help="The folder of a run.")],
     bins: Annotated[
@@ -250,7 +249,7 @@ def coverage(
     print_coverage(run, settings, found, as_json=as_json)
 
 
-@app.command(rich_help_panel=RESULTS)
+@analyses.command()
 @with_connection_options
 def regions(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
@@ -300,7 +299,7 @@ def regions(
     print_regions(found, as_json=as_json)
 
 
-@app.command(rich_help_panel=FILES)
+@app.command()
 @with_map_folder()
 @with_connection_options
 def simulate(
@@ -394,38 +393,6 @@ def simulate(
     else:
         print_file_result(file, result)
     _end(criteria.judge(file, result))
-
-
-@app.command("check-driver", rich_help_panel=SEARCH)
-def check_driver(
-    driver: Annotated[
-        str,
-        typer.Argument(
-            help="module:Class, file.py:Class, file.py:function, file.fmu, connect:HOST:PORT, "
-            "unix:PATH, 'exec:COMMAND'."
-        ),
-    ],
-    scenario: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Scenario to drive in; may be repeated.",
-            show_default="four that ship",
-            autocompletion=completing("scenario"),
-        ),
-    ] = None,
-    time_limit: common.TimeLimit = None,
-    as_json: common.Json = False,
-) -> None:
-    """Check that your driver gives repeatable results.
-
-    A scenario's result must depend on that scenario alone.
-    """
-    from bridgegen.cli.terminal.files import print_checks
-    from bridgegen.jobs.search.driver_contract import SCENARIOS, check_driver
-
-    checks = check_driver(driver, scenario or SCENARIOS, time_limit=time_limit)
-    if not print_checks(checks, as_json=as_json):
-        raise typer.Exit(1)
 
 
 def _end(outcomes: "Sequence[Outcome]") -> None:

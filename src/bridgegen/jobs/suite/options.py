@@ -131,7 +131,7 @@ class SuiteOptions(ScenariosOptions):
         metadata=option(
             FLAG,
             "Draw the preventability map of each scenario that has a grid of its own.",
-            spelling="--map",
+            spelling="--preventability",
             group=OUTPUT,
         ),
     )
