@@ -46,7 +46,7 @@ def test_simulate_a_scenario_file_says_what_to_do(cli, tmp_path):
     "words",
     [
         ("search", "cut-in", "--ego", "reference", "--ego", "careful"),
-        ("compare", "cut-in", "--ego=reference", "--ego", "careful"),
+        ("benchmark", "algorithms", "cut-in", "--ego=reference", "--ego", "careful"),
     ],
 )
 def test_an_option_of_one_value_is_given_once(cli, words):
@@ -98,7 +98,7 @@ def test_a_map_without_a_place_of_the_kind_says_so(cli, tmp_path):
     from tests.campaign.braking import write_pair
 
     write_pair(tmp_path)
-    status, out, _ = cli("places", tmp_path / "roads" / "straight.xodr", "crossroads-s4")
+    status, out, _ = cli("list", "places", tmp_path / "roads" / "straight.xodr", "crossroads-s4")
     assert status == 0
     approve(out, "crossroads-s4")
 
