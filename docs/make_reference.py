@@ -37,7 +37,7 @@ def command_line() -> str:
     """Return the page of all commands with their options."""
     parts = [
         "# Command line\n",
-        "What `bridgegen COMMAND --help` says, all of it.\n",
+        "What `bridgegen COMMAND --help-all` says.\n",
         "Exit status: 0 is success; 1 a driver that `validate` finds fault with, or a run of "
         "`reproduce` that failed (or a bug of ours); 2 a mistake in what was given, with one line "
         "on stderr for each; 3 a criterion of `--fail-if` that is met; 130 Ctrl-C, 143 SIGTERM.\n",

@@ -7,7 +7,6 @@ from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.cli import runs
-from bridgegen.cli.confirmations import confirm
 from bridgegen.cli.connection import (
     NO_CONNECTION,
     OPTIONS,
@@ -16,6 +15,7 @@ from bridgegen.cli.connection import (
     with_connection_options,
 )
 from bridgegen.cli.options import read_simulators
+from bridgegen.cli.results import confirm
 from bridgegen.simulation.choice import SIMULATORS
 
 

@@ -79,6 +79,16 @@ def test_validate_takes_files_drivers_and_kinds_of_schemas(cli):
     code, _, err = cli("validate")
     assert code == 2
     approve(err, "bridgegen")
-    code, _, err = cli("validate", "a.xosc", "--out", "b.json")
+    code, _, err = cli("validate", "a.xosc", "--json")
     assert code == 2
     approve(err, "--out")
+
+
+def test_a_run_file_with_an_old_spelling_is_read(tmp_path):
+    from bridgegen.cli.jobs import SUITE, command_of
+    from bridgegen.cli.run_files import keys_of, read_runs
+
+    path = tmp_path / "suite.yaml"
+    path.write_text("run: {files: [cut-in], map: true}")
+    (run,) = read_runs(path, keys_of(command_of(SUITE), SUITE.options), "files")
+    assert run.values["with_maps"]

@@ -1,5 +1,6 @@
-"""The commands that take files: export, check, draw, ask."""
+"""The commands that take files: export, check, draw, ask, fit."""
 
+import re
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -125,7 +126,7 @@ def export(
     if flavour not in (known := (*FLAVOURS, *_OF_FLAVOUR)):
         raise UnknownNameError("flavour", flavour, known)
     spelling = {"scenarios": "scenario", "start": "from", "end": "to"}
-    if wrong := given.keys() - _OF_FLAVOUR.get(flavour, {"scenarios", "town"}):
+    if wrong := given.keys() - _OF_FLAVOUR.get(flavour, {"scenarios", "town", "ego"}):
         names = [f"--{spelling.get(name, name)}" for name in values if name in wrong]
         raise InputError(f"--flavour {flavour} does not take {', '.join(names)}")
     if flavour != "parquet" and len(sources) > 1:
@@ -149,12 +150,9 @@ def export(
 
 
 def _size(text: str) -> tuple[int, int]:
-    width, _, height = text.partition("x")
-    if not (width.isascii() and width.isdigit() and height.isascii() and height.isdigit()):
+    if not (found := re.fullmatch(r"([0-9]{1,6})x([0-9]{1,6})", text)):
         raise InputError(f"--size must read WIDTHxHEIGHT, e.g. 960x540, got '{text}'")
-    if max(len(width), len(height)) > 6:
-        raise InputError(f"--size must have at most 6 digits each, got '{text}'")
-    return int(width), int(height)
+    return int(found[1]), int(found[2])
 
 
 @ontology.command("import")
@@ -255,11 +253,11 @@ def validate(
     if schema:
         _write_schema(given or ["scenario"], out)
         return
-    if out is not None or not given:
-        raise InputError(
-            "--out is for --schema" if given else "name a file or a driver: bridgegen validate FILE"
-        )
+    if not given:
+        raise InputError("name a file or a driver: bridgegen validate FILE")
     drivers = [item for item in given if _is_driver(item)]
+    if out is not None or (not drivers and (scenario or time_limit or as_json)):
+        raise InputError("--out is for --schema; --scenario, --time-limit and --json for drivers")
     _validate_files([Path(item) for item in given if item not in drivers], reason, strict)
     if drivers:
         from bridgegen.cli.terminal.files import print_checks
@@ -274,10 +272,12 @@ def validate(
 
 def _is_driver(text: str) -> bool:
     """Return whether a text names a driver, not a file to check."""
+    path = Path(text)
+    if ":" not in text and path.suffix.lower() in (".owl", ".xodr", ".xosc", ".yaml", ".yml"):
+        return False  # without what drivers import
     from bridgegen.drivers import DRIVERS, is_remote
     from bridgegen.drivers.planners import planners
 
-    path = Path(text)
     if is_remote(text) or path.suffix.lower() in (".py", ".fmu"):
         return True
     return not path.exists() and (":" in text or text in (*DRIVERS, *planners()))
@@ -407,6 +407,70 @@ def metrics(
     for note in measured.notes:
         print(f"bridgegen: note: {file}: {note}", file=sys.stderr)
     print_measured(file, measured, as_json=as_json)
+
+
+@app.command()
+def fit(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="A catalogue name, or the path of a YAML file.",
+            autocompletion=completing("scenario"),
+        ),
+    ],
+    events: Annotated[
+        Path,
+        typer.Argument(help="A table (.csv): a row per event, a column per parameter."),
+    ],
+    out: Annotated[Path, typer.Option(help="The exposure (.yaml), new or an earlier fit.")] = Path(
+        "exposure.yaml"
+    ),
+    page: Annotated[
+        Path | None, typer.Option(help="The page (.html); beside the exposure by default.")
+    ] = None,
+    xosc: Annotated[
+        Path | None,
+        typer.Option(help="Also write an OpenSCENARIO ParameterValueDistribution here."),
+    ] = None,
+    hours: Annotated[
+        float | None, typer.Option(help="Hours of driving in which the events happened [h].")
+    ] = None,
+    km: Annotated[
+        float | None, typer.Option(help="Distance of driving in which the events happened [km].")
+    ] = None,
+    ignore: Annotated[
+        list[str] | None,
+        typer.Option(help="A column that is no parameter; may be repeated."),
+    ] = None,
+    without_column: Annotated[
+        str | None,
+        typer.Option(help="Searched parameters without a column: uniform or default."),
+    ] = None,
+    source: Annotated[
+        str | None, typer.Option(help="Where the events come from, for the file.")
+    ] = None,
+    replicates: Annotated[int, typer.Option(help="Resampled fits, for bands and p values.")] = 200,
+    seed: Annotated[int, typer.Option(help="Seed of the random number generator.")] = 0,
+    as_json: options.Json = False,
+) -> None:
+    """Fit distributions of a scenario's parameters to events.
+
+    Chooses a form for each parameter, tests it, measures how they depend on each other, and
+    writes an exposure, and a page that shows how well it fits.
+    """
+    from bridgegen.cli.terminal.fit import FitProgress, print_fit
+    from bridgegen.jobs.fit import write_fit
+
+    notes: list[str] = []
+    with FitProgress() as live:
+        fitted, written = write_fit(
+            scenario, events, out=out, page=page, xosc=xosc, hours=hours, km=km,
+            ignore=ignore or (), others=without_column, source=source, replicates=replicates,
+            seed=seed, progress=live.progress, notes=notes,
+        )  # fmt: skip
+    for note in notes:
+        print(f"bridgegen: note: {note}", file=sys.stderr)
+    print_fit(fitted, written, as_json=as_json)
 
 
 @ontology.command("docs")

@@ -1,5 +1,6 @@
 """Help texts in which commands are listed by panel, and options by group."""
 
+import re
 import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -47,6 +48,18 @@ RENAMED_OPTIONS = {
 }
 """Old spellings of options by command, likewise."""
 
+MANY = 20
+"""Number of options above which the help of a command leaves out those that are `RARE`."""
+
+_RARE = (
+    "adversary ahead axes carla-command carla-timeout cause causes count detector distinct "
+    "distribution empty-trigger esmini-lib host ideal maps metrics objectives others place port "
+    "record scale screen screen-batch screen-budget screen-set set simulator-set time-limit triage "
+    "vehicle weights workers worse-than"
+)
+RARE = frozenset(f"--{name}" for name in _RARE.split())
+"""Options that few people need; ``--help-all`` lists them, too."""
+
 OTHER = "Options"
 """The group of the options that belong to none of `GROUPS`."""
 
@@ -54,7 +67,10 @@ OTHER = "Options"
 DEFAULT = "default"
 """The internal name of a `WithDefault`'s default command; users do not type it."""
 
-_BESIDE = "bridgegen.group"
+_MUST = {"valid integer": "a whole number", "valid number": "a number"}
+"""What a value must be, by a part of the parser's message."""
+
+_BESIDE, _WHOLE = "bridgegen.group", "bridgegen.whole"
 
 
 class PanelledGroup(TyperGroup):
@@ -62,7 +78,7 @@ class PanelledGroup(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the panels, each command with its summary."""
-        width = max(len(name) for names in PANELS.values() for name in names)
+        width = max(map(len, self.list_commands(ctx)))
         for panel, names in PANELS.items():
             short = {
                 name: self.commands[name].get_short_help_str(formatter.width - width - 4)
@@ -104,6 +120,8 @@ class GroupedCommand(TyperCommand):
             if new := renamed.get(old):
                 args[place] = f"{new}{equals}{value}"
                 _tell_new(ctx, old, new)
+        if "--help-all" in args:
+            ctx.meta[_WHOLE] = args = ["--help"]
         single = {
             spelling: param
             for param in self.params
@@ -128,16 +146,30 @@ class GroupedCommand(TyperCommand):
             if len(found) > 1
         ]:
             raise InputError(*twice)
-        return list(super().parse_args(ctx, args))
+        try:
+            return list(super().parse_args(ctx, args))
+        except typer.BadParameter as error:
+            name = str(error.param.opts[0]) if error.param else ""
+            # The parser's own words are those of a library of types.
+            must = next((must for kind, must in _MUST.items() if kind in error.message), None)
+            if must is None or name not in values:
+                raise
+            raise InputError(f"{name} must be {must}, got '{values[name][0]}'") from None
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the arguments, then the groups that the command has options of."""
         arguments: list[tuple[str, str]] = []
         groups: dict[str, list[tuple[str, str]]] = {group: [] for group in (*GROUPS, OTHER)}
+        is_whole = len(self.params) <= MANY or _WHOLE in ctx.meta
+        if not is_whole:
+            groups[OTHER].append(("--help-all", "Show all options, also those that few need."))
         for param in self.get_params(ctx):
             record = param.get_help_record(ctx)
-            if record is None:
+            if record is None or not (is_whole or RARE.isdisjoint(param.opts)):
                 continue
+            # Most of what may be repeated is a text: "<str>" says as much as "<list[str]>".
+            names = re.sub(r"<list\[(\w+)\]>", r"<\1>", record[0])
+            record = (names, re.sub(r"\[default: \((.*)\)\]$", r"[default: \1]", record[1]))
             if param.param_type_name == "argument":
                 arguments.append(record)
             else:

@@ -11,7 +11,7 @@ import typer
 
 from bridgegen.base.errors import BridgeGenError, Interrupted
 from bridgegen.cli import options as common
-from bridgegen.cli.app import FAILED, analyses, app
+from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import (
     NO_CONNECTION,
@@ -126,7 +126,7 @@ def search(
         Path | None,
         typer.Option(
             help="Folder of the run, new.",
-            show_default="runs/SCENARIO-DRIVER, or -2, -3 …",
+            show_default="runs/SCENARIO-DRIVER",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
@@ -223,80 +223,6 @@ def resume(
         )
     print_summary(run, live.seconds, verbose=verbose)
     _end(criteria.judge(run))
-
-
-@analyses.command()
-def coverage(
-    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
-    bins: Annotated[
-        int, typer.Option(help="Equal bins per parameter; whole numbers have one each.")
-    ] = 5,
-    strength: Annotated[
-        int, typer.Option(help="Maximum number of parameters in a combination of bins: 1, 2, 3.")
-    ] = 3,
-    exposure: common.Exposure = None,
-    as_json: common.Json = False,
-) -> None:
-    """Show which bins of the parameters a run evaluated.
-
-    Also shows which combinations of bins, and which of them are critical; with an
-    exposure, how much of what is met on the road these are.
-    """
-    from bridgegen.cli.terminal.search import print_coverage
-    from bridgegen.jobs.search.coverage import coverage_of
-
-    settings, found = coverage_of(run, bins=bins, strength=strength, exposure=exposure)
-    print_coverage(run, settings, found, as_json=as_json)
-
-
-@analyses.command()
-@with_connection_options
-def regions(
-    run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
-    samples: Annotated[
-        int, typer.Option(help="Fresh random scenarios to simulate in each region.")
-    ] = 300,
-    at_least: Annotated[
-        float,
-        typer.Option(
-            help="The share of critical scenarios that makes a region critical; the fresh ones "
-            "must show it with 95 % confidence."
-        ),
-    ] = 0.5,
-    seed: Annotated[
-        int | None,
-        typer.Option(help="Seed of the fresh scenarios.", show_default="the run's"),
-    ] = None,
-    exposure: common.Exposure = None,
-    ego: common.OwnEgo = None,
-    worse_than: common.OwnBaseline = None,
-    connection: Connection = NO_CONNECTION,
-    workers: common.Workers = None,
-    as_json: common.Json = False,
-) -> None:
-    """Find regions in which most scenarios are critical.
-
-    Each is a readable rule, verified by fresh scenarios; with an exposure, with the
-    share of encounters that lie in it.
-    """
-    from bridgegen.cli.terminal.regions import RegionsProgress, print_regions
-    from bridgegen.jobs.search.regions import regions_of
-
-    with RegionsProgress() as live:
-        found = regions_of(
-            run,
-            ego=ego,
-            worse_than=worse_than,
-            simulator=read_access(connection),
-            samples=samples,
-            at_least=at_least,
-            seed=seed,
-            exposure=exposure,
-            workers=workers,
-            stage=live.stage,
-            progress=live.progress,
-        )
-    print_regions(found, as_json=as_json)
 
 
 @app.command()

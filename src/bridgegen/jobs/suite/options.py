@@ -120,7 +120,7 @@ class SuiteOptions(ScenariosOptions):
         default=EMBEDDED,
         metadata=option(
             CHOICE,
-            "Simulator, see 'bridgegen list simulators'.",
+            "See 'bridgegen list simulators'.",
             shown="embedded",
             group=SIMULATOR,
             names="simulator",
