@@ -135,7 +135,6 @@ def test_sigterm_ends_a_search_like_ctrl_c(tmp_path):
     [
         (("search", "cut-in", "--budget", "ten"), "--budget"),
         (("search", "cut-in", "--time-limit=soon"), "--time-limit"),
-        (("benchmark", "algorithms", "cut-in", "--algorithms", "pso,foo"), "foo"),
         (("search", "cut-in", "--criterion", "A: always(foo > 2 m)"), "foo"),
         (("simulate", "bad.xosc"), "XML"),
         (("fit", "cut-in", "events.csv"), "--without-column"),

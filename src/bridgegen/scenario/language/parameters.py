@@ -262,7 +262,7 @@ class Derived:
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return ``"; did you mean '…'?"`` for the known name next to ``name``, or nothing."""
-    near = get_close_matches(name, list(known), n=1)
+    near = get_close_matches(name, list(known), n=1, cutoff=0.5)
     return f"; did you mean '{near[0]}'?" if near else ""
 
 
