@@ -30,7 +30,7 @@ def export(
     sources: Annotated[
         list[Path],
         typer.Argument(
-            metavar="SOURCE...",
+            metavar="SOURCE",
             help="The folder of a run, or one .xosc file; several runs for parquet; an ontology "
             "(.owl) for xosc.",
         ),
@@ -204,7 +204,7 @@ def validate(
     given: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="FILES...",
+            metavar="FILE",
             help="Files: .owl, .xodr, .xosc or .yaml; or drivers of your own: module:Class, "
             "file.py:Class, file.py:function, file.fmu, connect:HOST:PORT, unix:PATH, "
             "'exec:COMMAND'.",
@@ -234,7 +234,7 @@ def validate(
         typer.Option(
             "--schema",
             help="Print a JSON Schema, with which editors complete and check files. In place of "
-            "FILES, the kind: scenario (default), fragment, exposure, run (of a search), "
+            "FILE, the kind: scenario (default), fragment, exposure, run (of a search), "
             "algorithms, suite, diff, risk, preventability, dashboard or mine (run files of "
             "these), or safety-case (for programs that read one).",
         ),
