@@ -63,7 +63,6 @@ RARE = frozenset(f"--{name}" for name in _RARE.split())
 OTHER = "Options"
 """The group of the options that belong to none of `GROUPS`."""
 
-
 DEFAULT = "default"
 """The internal name of a `WithDefault`'s default command; users do not type it."""
 
