@@ -6,9 +6,9 @@
 
 A pair is a scenario and the ego's driver; the objective is harm. Each method searches each pair
 once for each seed, with the largest budget: a smaller budget's run is the beginning of it. The runs
-are those of `bridgegen compare`, one comparison for each driver; called again with the same folder,
-it resumes them. A method may be `file.py:Class`, as those of docs/examples. Twelve pairs, seven
-methods and 20 seeds of 1000 take hours.
+are those of `bridgegen benchmark algorithms`, one comparison for each driver; called again with
+the same folder, it resumes them. A method may be `file.py:Class`, as those of docs/examples. Twelve
+pairs, seven methods and 20 seeds of 1000 take hours.
 """
 
 import argparse

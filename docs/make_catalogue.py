@@ -20,7 +20,7 @@ HEAD = """\
 Logical scenarios that ship. Each picture shows the defaults at the moment of the closest approach,
 with the scenario's own ego driver; dashed outlines are the start positions. Search one with
 `bridgegen search NAME`, draw it with all its parameters, constraints and sources with
-`bridgegen show NAME`, start your own from it with `bridgegen new MINE --like NAME`.
+`bridgegen draw NAME`, start your own from it with `bridgegen new MINE --like NAME`.
 
 <!-- Written by docs/make_catalogue.py. -->
 """

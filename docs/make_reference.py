@@ -37,8 +37,8 @@ def command_line() -> str:
     """Return the page of all commands with their options."""
     parts = [
         "# Command line\n",
-        "What `bridgegen COMMAND --help` says, all of it.\n",
-        "Exit status: 0 is success; 1 a driver that `check-driver` finds fault with, or a run of "
+        "What `bridgegen COMMAND --help-all` says.\n",
+        "Exit status: 0 is success; 1 a driver that `validate` finds fault with, or a run of "
         "`reproduce` that failed (or a bug of ours); 2 a mistake in what was given, with one line "
         "on stderr for each; 3 a criterion of `--fail-if` that is met; 130 Ctrl-C, 143 SIGTERM.\n",
     ]
@@ -75,7 +75,7 @@ def scenario_files() -> str:
     parts = [
         "# Keys of a scenario file\n",
         "All keys, made of the same declarations as the reader and as the "
-        "[JSON Schema](bridgegen.schema.json), which `bridgegen schema` prints and "
+        "[JSON Schema](bridgegen.schema.json), which `bridgegen validate --schema` prints and "
         "`bridgegen new` puts beside your scenario so that an editor completes from it. "
         "[Writing a scenario](../scenarios.md) tells how they work together.\n",
         "A *quantity* is a number, or the name of a parameter or derived quantity. Keys in "

@@ -8,7 +8,7 @@ import pytest
 from tests.approval import refuses
 
 import bridgegen as bg
-from bridgegen.base.errors import StorageError
+from bridgegen.base.errors import InputError, StorageError
 from bridgegen.jobs.search.exported import exported_scenarios, read_facts
 
 
@@ -55,3 +55,18 @@ def test_an_exported_scenario_of_an_earlier_version_counts_from_0(run):
             read_facts(path)
     finally:
         path.write_text(text, "utf-8")
+
+
+def test_dir_shows_what_is_public():
+    assert dir(bg) == sorted([*bg.__all__, "__version__"])
+
+
+def test_load_reads_scenarios_and_runs(run):
+    assert bg.load("cut-in").name == "cut-in"
+    assert bg.load(run.folder).summary == bg.load(str(run.folder)).summary == run.summary
+    with refuses(StorageError):
+        bg.load(run.folder.parent)
+    with refuses(InputError, "runs/x"):
+        bg.load("runs/x")
+    with refuses(InputError, "buget"):
+        bg.run_search("cut-in", buget=3)

@@ -7,7 +7,6 @@ from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.cli import runs
-from bridgegen.cli.confirmations import confirm
 from bridgegen.cli.connection import (
     NO_CONNECTION,
     OPTIONS,
@@ -16,6 +15,7 @@ from bridgegen.cli.connection import (
     with_connection_options,
 )
 from bridgegen.cli.options import read_simulators
+from bridgegen.cli.results import confirm, regions
 from bridgegen.simulation.choice import SIMULATORS
 
 
@@ -24,9 +24,7 @@ def test_there_is_one_for_each_way_that_a_simulator_declares():
     assert {f"--{name.replace('_', '-')}" for name in OPTIONS} == declared
 
 
-@pytest.mark.parametrize(
-    "command", [runs.search, runs.resume, runs.regions, runs.simulate, confirm]
-)
+@pytest.mark.parametrize("command", [runs.search, runs.resume, regions, runs.simulate, confirm])
 def test_commands_have_them_all(command):
     assert {*OPTIONS} <= {*inspect.signature(command).parameters}
 

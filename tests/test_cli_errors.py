@@ -5,11 +5,13 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from tests.approval import approve
 
 CALL = [sys.executable, "-c", "from bridgegen.cli import main; main()"]
+EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
 
 
 def refused(cli, *words):
@@ -46,7 +48,7 @@ def test_simulate_reads_a_scenario_file_as_one(cli, tmp_path):
     "words",
     [
         ("search", "cut-in", "--ego", "reference", "--ego", "careful"),
-        ("compare", "cut-in", "--ego=reference", "--ego", "careful"),
+        ("benchmark", "algorithms", "cut-in", "--ego=reference", "--ego", "careful"),
     ],
 )
 def test_an_option_of_one_value_is_given_once(cli, words):
@@ -98,7 +100,7 @@ def test_a_map_without_a_place_of_the_kind_says_so(cli, tmp_path):
     from tests.campaign.braking import write_pair
 
     write_pair(tmp_path)
-    status, out, _ = cli("places", tmp_path / "roads" / "straight.xodr", "crossroads-s4")
+    status, out, _ = cli("list", "places", tmp_path / "roads" / "straight.xodr", "crossroads-s4")
     assert status == 0
     approve(out, "crossroads-s4")
 
@@ -126,3 +128,37 @@ def test_sigterm_ends_a_search_like_ctrl_c(tmp_path):
     assert running.returncode == 143
     approve(err, "bridgegen")
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("search", "cut-in", "--budget", "ten"), "--budget"),
+        (("search", "cut-in", "--time-limit=soon"), "--time-limit"),
+        (("search", "cut-in", "--criterion", "A: always(foo > 2 m)"), "foo"),
+        (("simulate", "bad.xosc"), "XML"),
+        (("fit", "cut-in", "events.csv"), "--without-column"),
+        (("suite", "r156"), "r156"),
+        (("confirm", "run", "--simulator", "esmini"), "run"),
+    ],
+)
+def test_mistakes_are_answered_in_words_of_the_command_line(
+    words, named, cli, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.xosc").write_text("no xml")
+    (tmp_path / "events.csv").write_text("cut_in_distance\n5\n6\n")
+    approve(refused(cli, *words), named)
+
+
+def test_an_export_of_an_own_driver_s_scenario_names_the_file_once(cli, tmp_path):
+    words = ("crossroads-s4", "--budget", 60, "--keep", 1, "--triage", "none", "--no-causes")
+    own = f"{EXAMPLES / 'my_driver.py'}:MyDriver"
+    assert cli("search", *words, "--ego", own, "--out", tmp_path / "r")[0] == 0
+    (path,) = (tmp_path / "r" / "critical").glob("*.xosc")
+    assert cli("export", tmp_path / "r", "--flavour", "1.3")[0] == 0  # nobody drives
+    for flavour in ("recorded", "carla"):
+        err = refused(cli, "export", path, "--flavour", flavour)
+        assert err.count(str(path)) == 1
+        approve(err, "--ego")
+        assert cli("export", path, "--flavour", flavour, "--ego", own)[0] == 0

@@ -12,7 +12,7 @@ from typer.main import get_command
 
 import bridgegen
 from bridgegen.cli import app
-from bridgegen.cli.groups import PANELS
+from bridgegen.cli.groups import PANELS, RARE
 from bridgegen.engine.options.option import GROUPS
 
 ROOT = get_command(app)
@@ -71,12 +71,12 @@ def test_the_version(cli):
 def test_the_panels_of_the_commands(cli):
     _, out, _ = cli("--help")
     titles = re.findall(r"^(\S.*):$", out, re.MULTILINE)
-    assert titles == ["Options", "Search", "Look at results", "Files", "Ontology", "Advanced"]
+    assert titles == ["Options", *PANELS]
 
 
 def test_the_options_of_a_search_are_in_groups(cli, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    _, out, _ = cli("search", "--help")
+    _, out, _ = cli("search", "--help-all")
     titles = re.findall(r"^(\S.*):$", out, re.MULTILINE)
     assert titles == ["Arguments", *SEARCH_GROUPS, "Options"]
     assert max(len(line) for line in out.splitlines()) <= 80
@@ -88,6 +88,23 @@ def test_the_options_of_a_search_are_in_groups(cli, monkeypatch):
     assert re.findall(r"^  (--[a-z-]+)", out.partition("\nOptions:\n")[2], re.MULTILINE) == [
         "--help"
     ]
+
+
+def test_a_long_help_leaves_out_what_few_people_need_and_says_how_to_see_it(cli, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    of_all = {
+        spelling for _, one in commands(ROOT) for item in one.params for spelling in item.opts
+    }
+    assert of_all >= RARE
+    _, short, _ = cli("search", "--help")
+    _, whole, _ = cli("search", "--help-all")
+    assert len(short.splitlines()) <= 60
+    shown = {*re.findall(r"^  (--[a-z-]+)", short, re.MULTILINE)}
+    left_out = {*re.findall(r"^  (--[a-z-]+)", whole, re.MULTILINE)} - shown
+    assert left_out <= RARE
+    assert len(left_out) > 25
+    assert "--help-all" in shown
+    assert "--help-all" not in cli("resume", "--help")[1]
 
 
 @pytest.mark.parametrize(("name", "command"), sorted(commands(ROOT)))

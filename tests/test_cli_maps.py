@@ -20,10 +20,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_map_is_found_by_its_name(cli, folder):
-    code, _, err = cli("import", "Town01")
+    code, _, err = cli("ontology", "import", "Town01")
     assert code == 2
     approve(err, "--maps", "CARLA_ROOT")
-    code, _, _ = cli("import", "Town01", "--maps", str(folder))
+    code, _, _ = cli("ontology", "import", "Town01", "--maps", str(folder))
     assert code == 0
     assert (folder.parent / "Town01.owl").exists()
     assert "CARLA_ROOT" not in os.environ
@@ -31,7 +31,7 @@ def test_a_map_is_found_by_its_name(cli, folder):
 
 def test_the_option_goes_before_the_variable(cli, folder, monkeypatch):
     monkeypatch.setenv("CARLA_ROOT", "/nowhere")
-    code, out, _ = cli("places", "Town01", "--maps", str(folder))
+    code, out, _ = cli("list", "places", "Town01", "--maps", str(folder))
     assert code == 0
     assert "1 lane, 30 m" in out
     assert os.environ["CARLA_ROOT"] == "/nowhere"

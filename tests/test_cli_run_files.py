@@ -220,10 +220,10 @@ def test_a_file_is_not_overwritten(cli, tmp_path):
 
 
 def test_the_schema_of_run_files(cli, tmp_path):
-    code, out, _ = cli("schema", "--of", "run")
+    code, out, _ = cli("validate", "--schema", "run")
     assert code == 0
     jsonschema.Draft7Validator.check_schema(json.loads(out))
-    code, _, err = cli("schema", "--of", "rn")
+    code, _, err = cli("validate", "--schema", "rn")
     assert code == 2
     approve(err, "rn", "run")
-    assert shlex.split(cli("schema", "run", "--out", tmp_path / "s.json")[1])
+    assert shlex.split(cli("validate", "--schema", "run", "--out", tmp_path / "s.json")[1])

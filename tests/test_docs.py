@@ -103,7 +103,7 @@ def test_every_algorithm_is_listed_as_it_describes_itself():
     from bridgegen.search.algorithms import ALGORITHMS
 
     text = (DOCS / "algorithms.md").read_text("utf-8")
-    table = text[text.index("| name |") : text.index("`bridgegen compare`")]
+    table = text[text.index("| name |") : text.index("`bridgegen benchmark algorithms`")]
     rows = [[cell.strip() for cell in line.strip("| ").split(" | ")] for line in table.splitlines()]
     told = {row[0].strip("`"): (row[1], row[3]) for row in rows if row[0].startswith("`")}
     assert told == {name: (one.description, one.source) for name, one in ALGORITHMS.items()}

@@ -22,7 +22,7 @@ from bridgegen.jobs.frame import Job, Judged, Table, command_of
 from bridgegen.simulation.choice import SimulatorChoice
 
 GIVEN = {
-    "compare": {
+    "benchmark algorithms": {
         "scenarios": ("cut-in", "crossroads-s4"), "algorithms": ("pso", "ga"), "seeds": 2,
         "settings": {"ga": {"population": 7}}, "baseline": "ga", "apart": 0.25, "budget": 9,
         "deliver": True,
@@ -173,7 +173,7 @@ def test_a_run_file_has_the_options_of_the_call_that_saved_it(job, asked, monkey
     jsonschema.validate(yaml.safe_load(Path("run.yaml").read_text()), schema_of(job))
     monkeypatch.chdir("/")
     more = ("--workers", "2") if hasattr(options, "workers") else ()
-    assert call(monkeypatch, job.name, tmp_path / "run.yaml", *more) == 0
+    assert call(monkeypatch, *job.name.split(), tmp_path / "run.yaml", *more) == 0
     assert not more or str(asked[1].workers) == "2"
     assert plain(located(asked[1], tmp_path)) == plain(located(asked[0], tmp_path))
     assert Path(asked[1].out) == tmp_path / "folder"
@@ -189,14 +189,15 @@ def test_a_file_of_several_runs_makes_each_in_a_folder_of_its_own(
     needed = in_file(job, needed)
     file = tmp_path / "both.yaml"
     file.write_text(json.dumps({"runs": {"a": needed, "b": needed}}))
-    assert call(monkeypatch, job.name, file) == 0
-    folders = [Path(job.name) / "both" / name for name in "ab"] if job.has_folder else [None, None]
+    assert call(monkeypatch, *job.name.split(), file) == 0
+    folders = [Path(job.last_word) / "both" / name for name in "ab"]
+    folders = folders if job.has_folder else [None, None]
     assert [one.out for one in asked] == folders
     file.write_text(f"runs: {{a: &a {json.dumps(needed)}, b: *a}}")
-    assert call(monkeypatch, job.name, file) == 2
+    assert call(monkeypatch, *job.name.split(), file) == 2
     assert "both.yaml" in capsys.readouterr().err
     file.write_text(yaml.safe_dump({"run": {**needed, "bugdet": 3}}))
-    assert call(monkeypatch, job.name, file) == 2
+    assert call(monkeypatch, *job.name.split(), file) == 2
     approve(capsys.readouterr().err, "bugdet")
 
 
@@ -217,7 +218,7 @@ def test_one_run_that_fails_does_not_keep_the_others(job, asked, monkeypatch, tm
 
     monkeypatch.setattr(Job, "run", refuse_the_first)
     file.write_text(json.dumps({"runs": {"a": needed, "b": needed}}))
-    assert call(monkeypatch, job.name, file) == 2
+    assert call(monkeypatch, *job.name.split(), file) == 2
     approve(capsys.readouterr().err, "bridgegen")
     assert asked == called[1:]
     assert len(asked) == 1

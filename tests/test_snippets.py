@@ -53,9 +53,7 @@ PAGES = sorted(path.stem for path in DOCS.glob("*.md"))
 BUDGET = "120"  # a failure of crossroads-s4 by pso needs 92
 SHORT = {
     "search": {"--budget": BUDGET, "--keep": "1", "--triage": "none"},
-    "compare": {"--seeds": "2", "--budget": "20", "--workers": "1"},
-    "regions": {"--samples": "20"},
-    "check-driver": {"--scenario": "cut-in"},
+    "benchmark": {"--seeds": "2", "--budget": "20", "--workers": "1"},
 }
 """What commands are run with instead of what the page says.
 
@@ -73,7 +71,6 @@ FEW = {
 """The same, of options that the page names."""
 
 COARSE = {
-    "video": {"--size": "320x180", "--fps": "4"},
     "suite": {"--workers": "1"},  # in this process
     "diff": {"--workers": "1"},
 }
@@ -116,6 +113,10 @@ def words_of(line: str) -> list[str]:
 def shortened(words: list[str], is_triaged: bool = False) -> list[str]:
     """Return a bridgegen command that takes less time."""
     short = dict(SHORT.get(words[1], {}))
+    if words[1:3] == ["analyse", "regions"]:
+        short = {"--samples": "20"}
+    if words[1] == "validate" and is_driver(words[2]):
+        short = {"--scenario": "cut-in"}
     if words[1] == "search" and is_triaged:
         short["--triage"] = "short"
     if words[1] == "search" and any(".py:" in word or word == "--adversary" for word in words):
@@ -126,7 +127,10 @@ def shortened(words: list[str], is_triaged: bool = False) -> list[str]:
         if option in found:
             found[found.index(option) + 1] = value
     is_subcommand = words[1:3] in (["suite", "add"], ["suite", "replay"])
-    for option, value in COARSE.get("" if is_subcommand else words[1], {}).items():
+    coarse = COARSE.get("" if is_subcommand else words[1], {})
+    for option, value in (
+        {"--size": "320x180", "--fps": "4"} if "video" in words else coarse
+    ).items():
         if option not in found:
             found += [option, value]
     for option, value in short.items():
@@ -137,6 +141,10 @@ def shortened(words: list[str], is_triaged: bool = False) -> list[str]:
     return found
 
 
+def is_driver(word: str) -> bool:
+    return ":" in word or word == "fiss"
+
+
 CHECKED = [f"docs/examples/my_{one}" for one in
            ("driver.py:MyDriver", "planner.py:MyPlanner", "network.py:MyNetwork")]  # fmt: skip
 """Drivers that ``tests/campaign/test_driver_contract.py`` checks."""
@@ -144,7 +152,7 @@ CHECKED = [f"docs/examples/my_{one}" for one in
 
 def is_known(words: list[str]) -> bool:
     """Return whether another test does the same; the command writes nothing."""
-    return words[1] == "check-driver" and words[2] in CHECKED
+    return words[1] == "validate" and words[2] in CHECKED
 
 
 class Page:

@@ -84,8 +84,8 @@ JOBS: dict[str, list[str]] = {
         "--matrix", "none", "--samples", "40", "--out", "suite-samples", "--json",
     ],
     "compare": [
-        "compare", "cut-in", "lead-brakes", "--algorithms", "random,pso", "--seeds", "2",
-        "--budget", "60", "--out", "compare",
+        "benchmark", "algorithms", "cut-in", "lead-brakes", "--algorithms", "random,pso",
+        "--seeds", "2", "--budget", "60", "--out", "compare",
     ],
     "diff": [
         "diff", "cut-in", "--ego", "reference", "--ego", "route-follower", "--samples", "50",
@@ -100,8 +100,8 @@ JOBS: dict[str, list[str]] = {
 AFTERWARDS: dict[str, list[str]] = {
     "mine": ["mine", "recordings", "--out", "mined", "--json"],
     "safety-case": ["safety-case", "search-s4", "search-bus", "--out", "safety-case", "--json"],
-    "regions": ["regions", "search-s4", "--json"],
-    "coverage": ["coverage", "search-bus", "--json"],
+    "regions": ["analyse", "regions", "search-s4", "--json"],
+    "coverage": ["analyse", "coverage", "search-bus", "--json"],
     "export": ["export", "search-bus", "--flavour", "resolved", "--out", "exported"],
     "dashboard": ["dashboard", ".", "--out", "dashboard.html", "--json"],
 }

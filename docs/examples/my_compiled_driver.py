@@ -1,6 +1,6 @@
 """A compiled driver of one's own: the driver of my_driver.py, one scenario at a time.
 
-bridgegen check-driver docs/examples/my_compiled_driver.py:drive
+bridgegen validate docs/examples/my_compiled_driver.py:drive
 bridgegen search cut-in --ego docs/examples/my_compiled_driver.py:drive
 """
 

@@ -1,6 +1,6 @@
 """A driver of one's own: pursues its route and brakes for whoever is close ahead.
 
-bridgegen check-driver docs/examples/my_driver.py:MyDriver
+bridgegen validate docs/examples/my_driver.py:MyDriver
 bridgegen search cut-in --ego docs/examples/my_driver.py:MyDriver
 """
 

@@ -1,6 +1,6 @@
 """A planner of one's own: five times a second, a trajectory along the route that keeps its gap.
 
-bridgegen check-driver docs/examples/my_planner.py:MyPlanner
+bridgegen validate docs/examples/my_planner.py:MyPlanner
 bridgegen search cut-in --ego docs/examples/my_planner.py:MyPlanner
 """
 

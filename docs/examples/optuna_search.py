@@ -1,6 +1,6 @@
 """Optuna's samplers as search algorithms (pip install optuna cmaes).
 
-bridgegen compare crossroads-s4 --algorithms pso,docs/examples/optuna_search.py:TPE
+bridgegen benchmark algorithms crossroads-s4 --algorithms pso,docs/examples/optuna_search.py:TPE
 """
 
 import warnings

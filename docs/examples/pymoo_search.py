@@ -1,6 +1,6 @@
 """Differential evolution, pymoo's, as a search algorithm; pymoo comes with BridgeGen.
 
-bridgegen compare crossroads-s4 --algorithms pso,docs/examples/pymoo_search.py:DE
+bridgegen benchmark algorithms crossroads-s4 --algorithms pso,docs/examples/pymoo_search.py:DE
 """
 
 from collections.abc import Mapping

@@ -1,6 +1,6 @@
 """VerifAI's samplers as search algorithms (pip install verifai).
 
-bridgegen compare crossroads-s4 --algorithms pso,docs/examples/verifai_search.py:CrossEntropy
+bridgegen benchmark algorithms cut-in --algorithms pso,docs/examples/verifai_search.py:CrossEntropy
 """
 
 import random

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from bridgegen.jobs.search import Run, resume, run_search
     from bridgegen.jobs.search.confirm import confirm
     from bridgegen.jobs.search.model import Model, model
+    from bridgegen.jobs.search.run import load
     from bridgegen.jobs.suite.difference import DriverDifference, compare_drivers
     from bridgegen.jobs.suite.suite import SuiteRun, run_suite
     from bridgegen.scenario.exposure import Exposure, exposure_of, read_exposure
     from bridgegen.scenario.exposure.fit import Fit, fit_exposure
-    from bridgegen.scenario.language.reader import load
     from bridgegen.simulation.choice import SimulatorChoice
 
 __all__ = [
@@ -85,7 +85,7 @@ _HOMES = {
     "exposure_of": "bridgegen.scenario.exposure",
     "fit_exposure": "bridgegen.scenario.exposure.fit",
     "read_exposure": "bridgegen.scenario.exposure",
-    "load": "bridgegen.scenario.language.reader",
+    "load": "bridgegen.jobs.search.run",
     "map_preventability": "bridgegen.jobs.preventability.preventability",
     "PreventabilityMap": "bridgegen.jobs.preventability.result",
     "Risk": "bridgegen.jobs.risk.result",
@@ -114,5 +114,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return all names, also those not imported yet, so that Tab completes them."""
-    return sorted({*globals(), *__all__, "__version__"})
+    """Return the public names, also those not imported yet, so that Tab completes them."""
+    return [*__all__, "__version__"]

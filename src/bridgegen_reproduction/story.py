@@ -279,8 +279,8 @@ def _again(found: Found) -> list[Block]:
                 ),
                 (
                     "All measures",
-                    "of “bridgegen compare”, with tests and figures for each scenario, are written "
-                    "by these commands, which find the runs made:",
+                    "of “bridgegen benchmark algorithms”, with tests and figures for each "
+                    "scenario, are written by these commands, which find the runs made:",
                 ),
             )
         ),

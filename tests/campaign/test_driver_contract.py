@@ -164,9 +164,9 @@ def test_a_driver_that_drives_nothing_is_not_tried_further():
 
 def test_the_command_says_it_and_ends_with_a_status():
     run = CliRunner().invoke
-    good = run(app, ["check-driver", f"{DRIVERS}:Cruises", "--scenario", CROSSROADS])
+    good = run(app, ["validate", f"{DRIVERS}:Cruises", "--scenario", CROSSROADS])
     assert good.exit_code == 0
     approve(good.output, "matter")
-    bad = run(app, ["check-driver", f"{DRIVERS}:Mixes", "--scenario", CROSSROADS, "--json"])
+    bad = run(app, ["validate", f"{DRIVERS}:Mixes", "--scenario", CROSSROADS, "--json"])
     assert bad.exit_code == 1
     assert '"problem": "row ' in bad.output

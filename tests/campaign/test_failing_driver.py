@@ -43,7 +43,7 @@ def test_a_driver_that_fails_in_every_scenario_ends_the_search(tmp_path, name, r
     with pytest.raises(InputError) as first:
         search(folder, ego, 1000)
     assert reason in str(first.value)
-    approve(str(first.value), "check-driver", ego)
+    approve(str(first.value), "bridgegen validate", ego)
     with Store.open(folder) as store:
         assert LEAST <= len(store) < 1000
         assert f"all {len(store)} scenarios" in str(first.value)

@@ -109,7 +109,7 @@ def test_one_seed_gives_one_result_however_many_threads(folder, found, tmp_path)
 def test_a_run_that_is_not_finished_has_regions_of_what_is_there(folder, tmp_path, cli):
     sql = ["DELETE FROM run WHERE key = 'finished'", "DELETE FROM evaluations WHERE id >= 200"]
     place = copied(folder, tmp_path / "run", sql=sql)
-    code, out, _ = cli("regions", place, "--samples", 50)
+    code, out, _ = cli("analyse", "regions", place, "--samples", 50)
     assert code == 0
     approve(out, "200")
     assert json.loads((place / "regions.json").read_text("utf-8"))["rows"] == 200
@@ -117,7 +117,7 @@ def test_a_run_that_is_not_finished_has_regions_of_what_is_there(folder, tmp_pat
 
 def test_the_command_says_what_holds_and_what_does_not(folder, found, cli, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
-    code, out, err = cli("regions", folder, "--samples", 100)
+    code, out, err = cli("analyse", "regions", folder, "--samples", 100)
     assert (code, err.strip()) == (0, "")
     approve(out, "50")
     table, _, rest = out.partition("Not confirmed:")
@@ -130,7 +130,7 @@ def test_the_command_says_what_holds_and_what_does_not(folder, found, cli, monke
     held = f"{found.found.critical_held} of the run's {found.found.critical} critical scenarios"
     assert held in out
     assert f"{len(found.found.regions) * 100} fresh scenarios, seed 1" in out
-    code, out, _ = cli("regions", folder, "--samples", 100, "--json")
+    code, out, _ = cli("analyse", "regions", folder, "--samples", 100, "--json")
     assert (code, json.loads(out)) == (0, json.loads(json.dumps(found.record)))
 
 
@@ -142,13 +142,13 @@ def test_a_report_that_is_there_is_written_again_with_the_regions(folder, tmp_pa
     assert made.files[-1] == place / "report.html"
     text = made.files[-1].read_text()
     assert json.dumps(made.record["regions"][0]["rule"])[1:-1] in text
-    assert f'"view":"bridgegen view {place}"' in text
+    assert f'"view":"bridgegen open {place}"' in text
 
 
 def test_nothing_that_holds_is_said_and_leaves_no_class(folder, tmp_path, cli):
     place = copied(folder, tmp_path / "run")
     (place / "regions.owl").write_text("of an earlier time", "utf-8")
-    code, out, _ = cli("regions", place, "--samples", 3)  # three rows confirm nothing
+    code, out, _ = cli("analyse", "regions", place, "--samples", 3)  # three rows confirm nothing
     assert code == 0
     approve(out, "50", "confirmed")
     assert not (place / "regions.owl").exists()
@@ -157,7 +157,7 @@ def test_nothing_that_holds_is_said_and_leaves_no_class(folder, tmp_path, cli):
 
 def test_every_mistake_is_one_clear_error(folder, tmp_path, cli):
     def refused(*words):
-        code, _, err = cli("regions", *words)
+        code, _, err = cli("analyse", "regions", *words)
         assert (code, "Traceback" in err) == (2, False)
         return err
 
@@ -213,7 +213,7 @@ def test_of_a_scenario_file_s_choices_the_values_are_said(tmp_path, cli):
         scenario, distribution=ranges, algorithm="random", budget=500, keep=0, deliver=False,
         out=place,
     )  # fmt: skip
-    code, out, _ = cli("regions", place)
+    code, out, _ = cli("analyse", "regions", place)
     assert code == 0
     record = json.loads((place / "regions.json").read_text("utf-8"))
     edges = {
@@ -258,7 +258,9 @@ def test_with_an_exposure_it_says_how_likely_it_is_to_meet_them(folder, tmp_path
         assert low <= told["exposure"]["share"] <= high
         assert told["exposure"]["share"] == pytest.approx(one.space_share, abs=0.06)
     (tmp_path / "road.yaml").write_text(EXPOSURE)
-    code, out, err = cli("regions", place, "--samples", 50, "--exposure", tmp_path / "road.yaml")
+    code, out, err = cli(
+        "analyse", "regions", place, "--samples", 50, "--exposure", tmp_path / "road.yaml"
+    )
     assert code == 0, err
     approve(" ".join(out.split()), "source")
     record = json.loads((place / "regions.json").read_text("utf-8"))

@@ -74,17 +74,17 @@ def test_a_summary_as_json_has_no_infinite_number_and_all_units(crash):
 
 
 def test_metrics_prints_the_conflict(cli, crash):
-    status, out, _ = cli("metrics", crash)
+    status, out, _ = cli("analyse", "recording", crash)
     assert status == 0
     approve(out, "front-to-rear", "10.0 m/s", "5.0 m/s", "delta-v")
-    status, out, _ = cli("metrics", crash, "--json")
+    status, out, _ = cli("analyse", "recording", crash, "--json")
     facts = json.loads(out)["conflict"]
     assert facts["time"] == {"value": pytest.approx(4.8), "unit": "s"}
     assert facts["assumptions"] == [NO_MAP, NO_KINDS, NO_OFFSET]
 
 
 def test_only_harm_can_be_asked_for(cli, crash):
-    status, out, _ = cli("metrics", crash, "--metrics", "harm", "--json")
+    status, out, _ = cli("analyse", "recording", crash, "--metrics", "harm", "--json")
     assert status == 0
     assert list(json.loads(out)["metrics"]) == ["harm"]
 

@@ -157,7 +157,7 @@ def test_a_click_on_an_exported_point_plays_it(page, report):
 
 
 def test_a_click_on_a_point_without_motion_gives_the_command(page, report, show):
-    data = replace(report, summary=replace(report.summary, view="bridgegen view 'runs/s 4'"))
+    data = replace(report, summary=replace(report.summary, view="bridgegen open 'runs/s 4'"))
     other = show(data)
     other.select_option("#axis-x", "d_min")
     other.select_option("#axis-y", "ego_speed")
@@ -165,9 +165,9 @@ def test_a_click_on_a_point_without_motion_gives_the_command(page, report, show)
     evaluation, box = lone(report, critical=False), box_of(other)
     x, y = pixel_of(other, evaluation)
     other.mouse.move(box["x"] + x, box["y"] + y)
-    assert "to play it: bridgegen view" in other.inner_text(".chart-tip:visible")
+    assert "to play it: bridgegen open" in other.inner_text(".chart-tip:visible")
     other.mouse.click(box["x"] + x, box["y"] + y)
-    want = f"bridgegen view 'runs/s 4' --evaluation {evaluation + 1}"
+    want = f"bridgegen open 'runs/s 4' --evaluation {evaluation + 1}"
     assert other.inner_text("#no-motion-command") == want
     other.close()
 

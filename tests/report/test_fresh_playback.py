@@ -48,7 +48,7 @@ def test_the_page_holds_the_failing_draws_with_their_files(unlucky):
 
 def test_a_page_that_is_made_later_holds_the_same(unlucky, tmp_path):
     run = bg.Run(shutil.copytree(unlucky.folder, tmp_path / "run"))
-    (path,) = rewrite_report(run, pipeline_of(run, "view"), lambda stage: None)
+    (path,) = rewrite_report(run, pipeline_of(run, "open"), lambda stage: None)
     written = data_of(unlucky.report.read_text("utf-8"))["kept"]
     assert data_of(path.read_text("utf-8"))["kept"] == written
     view = RunView(run.folder)

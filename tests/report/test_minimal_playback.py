@@ -11,7 +11,7 @@ def test_it_is_the_exported_scenario(tmp_path):
     run = bg.run_search("pedestrian-behind-parked", budget=80, keep=2, ego="route-follower",
                         out=tmp_path / "run")  # fmt: skip
     mode = next(one for one in run.modes if one.minimal is not None)
-    pipeline = pipeline_of(run, "view")
+    pipeline = pipeline_of(run, "open")
     (played,) = minimal_playbacks(pipeline, [("m", mode.shown, (), mode.minimal)])
     exported = bg.simulate_file(run.folder / "critical" / f"{mode.minimal.name}.xosc")
     assert played.metrics["harm"] == pytest.approx(mode.minimal.harm)

@@ -216,7 +216,7 @@ def test_files_are_saved_from_the_page_itself_or_linked(browser, more, tmp_path)
 
 @pytest.mark.browser
 def test_what_it_does_not_hold_it_names_the_command_for(browser, more, tmp_path):
-    shown = replace(more, summary=replace(more.summary, view="bridgegen view 'my runs/s4'"))
+    shown = replace(more, summary=replace(more.summary, view="bridgegen open 'my runs/s4'"))
     write_report(tmp_path / "report.html", shown)
     page = browser.new_page()
     page.goto((tmp_path / "report.html").as_uri())
@@ -224,7 +224,7 @@ def test_what_it_does_not_hold_it_names_the_command_for(browser, more, tmp_path)
     other = next(i for i in np.flatnonzero(more.evaluations.critical).tolist() if i not in there)
     page.evaluate(f"bridgegen.open({other})")
     page.wait_for_selector("#no-motion")
-    command = f"bridgegen view 'my runs/s4' --evaluation {other + 1}"
+    command = f"bridgegen open 'my runs/s4' --evaluation {other + 1}"
     assert page.inner_text("#no-motion-command") == command
     assert page.inner_text("#measures h3") == f"Evaluation {other + 1}"
     page.evaluate(f"bridgegen.open({more.more[0].evaluation})")

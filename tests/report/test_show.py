@@ -76,7 +76,7 @@ def test_mistakes_are_one_clear_error(owl, tmp_path):
 
 def test_on_the_command_line(owl):
     edit(owl, r"(<bg:has_fog_density[^>]*>)[^<]*<", r"\g<1>140<")
-    command = [sys.executable, "-c", "from bridgegen.cli import main; main()", "show", str(owl)]
+    command = [sys.executable, "-c", "from bridgegen.cli import main; main()", "draw", str(owl)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout == f"{owl.with_suffix('.html')}\n"
     assert re.search(r"warning: .*it\.owl: \d+ violations?, shown in red", done.stderr)

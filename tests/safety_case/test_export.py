@@ -143,5 +143,5 @@ def test_the_command(cli, run, tmp_path):
     code, out, err = cli("safety-case", str(tmp_path / "nowhere"))
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
-    code, out, err = cli("schema", "safety-case")
+    code, out, err = cli("validate", "--schema", "safety-case")
     assert json.loads(out)["$id"] == "urn:bridgegen:safety-case"

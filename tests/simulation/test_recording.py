@@ -73,7 +73,7 @@ def test_a_trace_of_ours_gives_the_metrics_of_the_simulation_to_the_last_bit(
     for dt in (None, 0.03):
         step = () if dt is None else ("--dt", dt)
         simulated = json.loads(run("simulate", xosc, "--trace", path, "--json", *step))["metrics"]
-        measured = json.loads(run("metrics", path, "--json"))
+        measured = json.loads(run("analyse", "recording", path, "--json"))
         path.unlink()
         assert measured["metrics"] == {name: simulated[name] for name in measured["metrics"]}
         assert set(simulated) - set(measured["metrics"]) <= {"r_red", "iou", "e_position", "map"}

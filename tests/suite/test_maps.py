@@ -82,7 +82,8 @@ def test_the_page_shows_the_maps(mapped):
 
 def test_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(module, "MOST_CELLS", 60)
-    words = ["bridgegen", "suite", str(PACK / "deceleration.yaml"), "--samples", "1", "--map"]
+    words = ["bridgegen", "suite", str(PACK / "deceleration.yaml"), "--samples", "1"]
+    words.append("--preventability")
     words += ["--ego", "reference", "--fail-if", "failed_clauses > 0", "--json"]
     monkeypatch.setattr("sys.argv", [*words, "--out", str(tmp_path / "out")])
     with pytest.raises(SystemExit) as end:

@@ -180,13 +180,13 @@ def test_a_line_of_the_list_reads_no_rows(finished, monkeypatch):
 def test_a_folder_without_runs_is_one_clear_error(tmp_path, cli):
     with refuses(StorageError):
         FolderView(tmp_path)
-    code, _, said = cli("view", str(tmp_path))
+    code, _, said = cli("open", str(tmp_path))
     assert code != 0
     approve(said, "contains")
 
 
 def test_options_of_one_run_are_refused_for_a_folder_of_runs(runs, cli):
-    code, _, said = cli("view", str(runs), "--evaluation", "3")
+    code, _, said = cli("open", str(runs), "--evaluation", "3")
     assert code != 0
     approve(said, "itself")
 

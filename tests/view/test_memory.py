@@ -22,7 +22,7 @@ def repeated(source, folder, n):
     with Store.open(source) as store:
         rows, names = store.read(), (store.parameters, store.metrics)
         settings = replace(Settings.from_dict(store.settings, source), budget=n)
-        space = pipeline_of(Run(source), "view").space
+        space = pipeline_of(Run(source), "open").space
     at = np.arange(n) % len(rows)
     U = np.random.default_rng(0).random((n, space.n_var))
     some = rows.take(at)

@@ -157,7 +157,7 @@ def test_a_long_run_comes_thinned_as_a_whole(growing, monkeypatch):
 )
 def test_every_mistake_is_one_clear_error(finished, tmp_path, monkeypatch, capsys, words, message):
     words = [word.format(run=finished, nowhere=tmp_path / "nowhere") for word in words]
-    monkeypatch.setattr(sys, "argv", ["bridgegen", "view", "--no-browser", *words])
+    monkeypatch.setattr(sys, "argv", ["bridgegen", "open", "--no-browser", *words])
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 2
@@ -176,7 +176,7 @@ def test_what_was_handed_over_must_be_readable(growing):
 
 def test_the_command_serves_until_ctrl_c(finished):
     code = "import sys; from bridgegen.cli import main; sys.exit(main())"
-    command = [sys.executable, "-c", code, "view", str(finished), "--no-browser"]
+    command = [sys.executable, "-c", code, "open", str(finished), "--no-browser"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     server = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
@@ -202,7 +202,7 @@ def test_the_browser_is_opened_at_the_evaluation(finished, monkeypatch, capsys):
         opened.append((url, page.read_text("utf-8"), page.parent.stat().st_mode))
         raise KeyboardInterrupt
 
-    words = ["bridgegen", "view", str(finished), "--evaluation", "17"]
+    words = ["bridgegen", "open", str(finished), "--evaluation", "17"]
     monkeypatch.setattr(sys, "argv", words)
     monkeypatch.setattr("webbrowser.open", interrupted)
     with pytest.raises(SystemExit) as end:

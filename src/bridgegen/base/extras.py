@@ -30,7 +30,7 @@ EXTRAS = {
     "ray": Extra(("ray",), "workers on more than one machine: --workers ray"),
     "pandas": Extra(("pandas",), "results as data frames in Python: run.frame()"),
     "parquet": Extra(
-        ("pyarrow",), "Parquet files: bridgegen table, and Argoverse 2 in bridgegen mine"
+        ("pyarrow",), "Parquet: bridgegen export --flavour parquet, Argoverse 2 in bridgegen mine"
     ),
     "osi": Extra(("lz4", "zstandard"), "compressed MCAP files of ASAM OSI in bridgegen mine"),
     "fmi": Extra(("fmpy",), "drivers in co-simulation units (.fmu)"),

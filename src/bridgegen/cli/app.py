@@ -12,7 +12,7 @@ import typer
 
 from bridgegen.base.errors import BridgeGenError, Interrupted
 from bridgegen.base.processes.child import collect_rarely
-from bridgegen.cli.groups import ONTOLOGY, SEARCH, Application, PanelledGroup, WithDefault
+from bridgegen.cli.groups import Application, PanelledGroup, WithDefault
 
 FAILED = 3
 """The exit status if a criterion of ``--fail-if`` holds; 1 is Python's for a bug, 2 a user's error,
@@ -28,28 +28,37 @@ app = Application(
     rich_markup_mode=None,
 )
 listing = Application(
-    help="List scenarios, algorithms, drivers …",
+    help="List scenarios, algorithms, drivers, places of a map …",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-app.add_typer(listing, name="list", rich_help_panel=SEARCH)
+app.add_typer(listing, name="list")
 
 suites = Application(
     cls=WithDefault,
     help="Run many scenario files with all their variations.",
     rich_markup_mode=None,
 )
-app.add_typer(suites, name="suite", rich_help_panel=SEARCH)
+app.add_typer(suites, name="suite")
 
 benchmarks = Application(
-    help="Compare planners by the failures that a search finds.",
+    help="Compare planners, or search algorithms.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-app.add_typer(benchmarks, name="benchmark", rich_help_panel=SEARCH)
+app.add_typer(benchmarks, name="benchmark")
 
-ontology = Application(help="Document the ontology.", no_args_is_help=True, rich_markup_mode=None)
-app.add_typer(ontology, name="ontology", rich_help_panel=ONTOLOGY)
+analyses = Application(
+    help="Analyse a run, or a recording.", no_args_is_help=True, rich_markup_mode=None
+)
+app.add_typer(analyses, name="analyse")
+
+ontology = Application(
+    help="Scenarios and maps as individuals of the ontology.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+app.add_typer(ontology, name="ontology")
 
 
 def _print_version(wanted: bool) -> None:

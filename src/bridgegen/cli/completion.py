@@ -4,6 +4,7 @@ Each list is made when it is asked for: the command line starts without the modu
 """
 
 from collections.abc import Callable, Iterable
+from importlib import import_module
 
 import typer
 
@@ -73,32 +74,8 @@ def _drivers(_: typer.Context) -> Iterable[str]:
     return (*DRIVERS, *planners())
 
 
-def _others(_: typer.Context) -> Iterable[str]:
-    from bridgegen.drivers import OTHERS
-
-    return OTHERS
-
-
-def _stages(_: typer.Context) -> Iterable[str]:
-    from bridgegen.drivers import STAGES
-
-    return STAGES
-
-
-def _metrics(_: typer.Context) -> Iterable[str]:
-    from bridgegen.assess.conflict.quantities import QUANTITIES
-
-    return QUANTITIES
-
-
 def _objectives(ctx: typer.Context) -> Iterable[str]:
-    return ["harm", "paper", *_metrics(ctx)]
-
-
-def _critical(_: typer.Context) -> Iterable[str]:
-    from bridgegen.assess.objective import RULES
-
-    return RULES
+    return ["harm", "paper", *NAMES["metric"](ctx)]
 
 
 def _parameters(ctx: typer.Context) -> Iterable[str]:
@@ -116,34 +93,22 @@ def _axes(_: typer.Context) -> Iterable[str]:
     return [str(axis) for axis in Axis]
 
 
-def _simulators(_: typer.Context) -> Iterable[str]:
-    from bridgegen.simulation.choice import SIMULATORS
-
-    return list(SIMULATORS)
-
-
-def _vehicles(_: typer.Context) -> Iterable[str]:
-    from bridgegen.simulation.vehicles import VEHICLES
-
-    return list(VEHICLES)
-
-
 def _causes(_: typer.Context) -> Iterable[str]:
     from bridgegen.assess.cause import CAUSES
 
     return [cause.label for cause in CAUSES]
 
 
-def _triages(_: typer.Context) -> Iterable[str]:
-    from bridgegen.search.triage.effort import EFFORTS
-
-    return EFFORTS
-
-
 def _flavours(_: typer.Context) -> Iterable[str]:
     from bridgegen.jobs.search.export import FLAVOURS
 
-    return FLAVOURS
+    return (*FLAVOURS, "parquet", "video", "xosc")
+
+
+def _keys(place: str) -> Callable[[typer.Context], Iterable[str]]:
+    """Return what lists the names that something of a module, ``module:name``, holds."""
+    module, _, name = place.partition(":")
+    return lambda _: list(getattr(import_module(f"bridgegen.{module}"), name))
 
 
 def _fixed(*words: str) -> Callable[[typer.Context], Iterable[str]]:
@@ -156,17 +121,17 @@ NAMES: dict[str, Callable[[typer.Context], Iterable[str]]] = {
     "algorithm": _algorithms,
     "setting": _settings,
     "driver": _drivers,
-    "others": _others,
-    "vehicle": _vehicles,
-    "stage": _stages,
-    "metric": _metrics,
+    "others": _keys("drivers:OTHERS"),
+    "vehicle": _keys("simulation.vehicles:VEHICLES"),
+    "stage": _keys("drivers:STAGES"),
+    "metric": _keys("assess.conflict.quantities:QUANTITIES"),
     "objective": _objectives,
-    "critical": _critical,
+    "critical": _keys("assess.objective:RULES"),
     "parameter": _parameters,
     "axis": _axes,
-    "simulator": _simulators,
+    "simulator": _keys("simulation.choice:SIMULATORS"),
     "cause": _causes,
-    "triage": _triages,
+    "triage": _keys("search.triage.effort:EFFORTS"),
     "weights": _fixed("fixed", "entropy"),
     "scale": _fixed("raw", "standardised"),
     "objectives": _fixed("one", "many"),

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from bridgegen.base.errors import InputError
-from bridgegen.cli.declared import expand
+from bridgegen.cli.declared import expand, with_parameters
 from bridgegen.engine.options.option import SIMULATOR
 from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
 
@@ -21,62 +21,29 @@ Connection = Mapping[str, Value]
 
 NO_CONNECTION: Connection = {}
 
+
+def _option(kind: type, help: str, default: str | bool = False) -> Any:
+    option = typer.Option(rich_help_panel=SIMULATOR, help=help, show_default=default)
+    return Annotated[kind | None, option]
+
+
 OPTIONS: Mapping[str, Any] = {
-    "esmini_lib": Annotated[
-        Path | None,
-        typer.Option(
-            rich_help_panel=SIMULATOR,
-            help="esmini's library, libesminiLib.so, for esmini.",
-            show_default="ESMINI_LIB of the environment",
-        ),
-    ],
-    "host": Annotated[
-        str | None,
-        typer.Option(
-            rich_help_panel=SIMULATOR,
-            help="The server's machine, for CARLA.",
-            show_default="localhost",
-        ),
-    ],
-    "port": Annotated[
-        int | None,
-        typer.Option(
-            rich_help_panel=SIMULATOR,
-            help="The server's port, for CARLA.",
-            show_default="2000",
-        ),
-    ],
-    "carla_command": Annotated[
-        str | None,
-        typer.Option(
-            rich_help_panel=SIMULATOR,
-            help="Command that starts a CARLA server, also after a crash.",
-            show_default="none",
-        ),
-    ],
-    "carla_timeout": Annotated[
-        float | None,
-        typer.Option(
-            rich_help_panel=SIMULATOR,
-            help="Time limit of an answer of CARLA [s].",
-            show_default="20",
-        ),
-    ],
-    "record": Annotated[
-        Path | None,
-        typer.Option(
-            rich_help_panel=SIMULATOR,
-            help="A new folder for camera images, LiDAR points, boxes and incidents, with CARLA.",
-        ),
-    ],
-    "detector": Annotated[
-        str | None,
-        typer.Option(
-            rich_help_panel=SIMULATOR,
-            help="A detector of your own that looks at CARLA's images: module:Class, "
-            "file.py:Class.",
-        ),
-    ],
+    "esmini_lib": _option(
+        Path, "esmini's library, libesminiLib.so, for esmini.", "ESMINI_LIB of the environment"
+    ),
+    "host": _option(str, "The server's machine, for CARLA.", "localhost"),
+    "port": _option(int, "The server's port, for CARLA.", "2000"),
+    "carla_command": _option(
+        str, "Command that starts a CARLA server, also after a crash.", "none"
+    ),
+    "carla_timeout": _option(float, "Time limit of an answer of CARLA [s].", "20"),
+    "record": _option(
+        Path, "A new folder for camera images, LiDAR points, boxes and incidents, with CARLA."
+    ),
+    "detector": _option(
+        str,
+        "A detector of your own that looks at CARLA's images: module:Class, file.py:Class.",
+    ),
 }
 """Connection options that the simulators declare, by parameter name."""
 
@@ -144,10 +111,7 @@ def with_map_folder(
         parameter = inspect.Parameter(
             "maps", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option
         )
-        made = [*signature.parameters.values(), parameter]
-        wrapper.__signature__ = signature.replace(parameters=made)  # type: ignore[attr-defined]
-        wrapper.__annotations__ = {item.name: item.annotation for item in made}
-        return wrapper
+        return with_parameters(wrapper, [*signature.parameters.values(), parameter])
 
     return decorate
 

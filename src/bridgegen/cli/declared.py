@@ -1,7 +1,7 @@
 """Options of the command line from the declarations in `bridgegen.engine.options`."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
 from inspect import signature
@@ -44,8 +44,14 @@ def expand(
         folded = fold({name: values.pop(name) for name in options})
         command(**values, **{parameter: folded})
 
-    # typer reads a command's signature and annotations; both have to say the expanded options.
-    wrapper.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return with_parameters(wrapper, parameters)
+
+
+def with_parameters(
+    wrapper: Callable[..., None], parameters: Sequence[inspect.Parameter]
+) -> Callable[..., None]:
+    """Return a function with other parameters: typer reads its signature and annotations."""
+    wrapper.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     wrapper.__annotations__ = {item.name: item.annotation for item in parameters}
     return wrapper
 

@@ -10,14 +10,13 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli.app import app
-from bridgegen.cli.groups import SEARCH
 
 SCENARIO, DRIVER, ALGORITHM, BUDGET = "cyclist-right-turn", "route-follower", "nsga2", 600
 """Search of the demonstration: UN R157's driver brakes for what is on its lane, and for nothing
 that crosses it."""
 
 
-@app.command(rich_help_panel=SEARCH)
+@app.command()
 def demo(
     open_page: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page in your browser.")
@@ -49,7 +48,7 @@ def demo(
     print_summary(run, live.seconds)
     if open_page and not webbrowser.open(run.report.resolve().as_uri()):
         print(
-            f"bridgegen: no browser found: open {run.report} yourself, or see 'bridgegen view "
+            f"bridgegen: no browser found: open {run.report} yourself, or see 'bridgegen open "
             f"{folder}'",
             file=sys.stderr,
         )

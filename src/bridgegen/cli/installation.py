@@ -107,12 +107,15 @@ def _bits() -> Finding:
 
 
 def _esmini() -> Finding:
+    from bridgegen.simulation.esmini.simulator import RELEASES
+
     path = os.environ.get(ESMINI)
     if path is None:
         return Finding(
             "esmini",
             f"unknown: {ESMINI} is not set",
-            "name libesminiLib.so of esmini 3 in it, or by --esmini-lib (docs/esmini.md)",
+            f"get libesminiLib.so of esmini 3 from {RELEASES}; name it in {ESMINI}, or by "
+            "--esmini-lib (docs/esmini.md)",
         )
     if not Path(path).is_file():
         return Finding("esmini", f"{path}: no such file", f"correct {ESMINI}", is_problem=True)

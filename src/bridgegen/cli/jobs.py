@@ -143,7 +143,7 @@ def run_all(
     for run in runs:
         print(f"\n{run.name}", flush=True)
         try:
-            folder = Path(job.name) / path.stem / run.name
+            folder = Path(job.last_word) / path.stem / run.name
             command({**({"out": folder} if job.has_folder else {}), **run.values})
         except typer.Exit as ended:
             status = max(status, ended.exit_code)
@@ -171,10 +171,10 @@ def _add(job: Job) -> None:
     command = with_map_folder(WHAT)(command)
     if job is SUITE:
         suites.command(DEFAULT, cls=DefaultCommand)(command)
-    elif job is BENCHMARK:
-        benchmarks.command(job.name.split()[-1])(command)
+    elif job.name.startswith("benchmark "):
+        benchmarks.command(job.last_word)(command)
     else:
-        app.command(job.name, rich_help_panel=job.panel)(command)
+        app.command(job.name)(command)
 
 
 for _job in JOBS:

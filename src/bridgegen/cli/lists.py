@@ -1,64 +1,82 @@
-"""The commands that list scenarios, algorithms, drivers, simulators and metrics."""
+"""The commands that list what there is: scenarios, drivers, places of a map …, the installation."""
 
 import json
-from typing import Annotated
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bridgegen.cli import options
-from bridgegen.cli.app import listing
+from bridgegen.cli.app import app, listing
 from bridgegen.cli.completion import completing
+from bridgegen.cli.connection import with_map_folder
+
+if TYPE_CHECKING:
+    from bridgegen.jobs.search.places import PlaceFit
+
+Listed = tuple[Sequence[str], Sequence[Any]]
+"""The head of a list, and its rows."""
 
 
-@listing.command("scenarios")
-def list_scenarios(as_json: options.Json = False) -> None:
+def _of(name: str, *, entries: bool = False) -> Callable[[Callable[[], Listed]], None]:
+    """Return what makes a command of a function: a table, or an entry for each row."""
+
+    def decorate(made: Callable[[], Listed]) -> None:
+        def command(as_json: options.Json = False) -> None:
+            from bridgegen.cli.terminal.tables import print_entries, print_table
+
+            (print_entries if entries else print_table)(*made(), as_json=as_json)
+
+        command.__doc__ = made.__doc__
+        listing.command(name)(command)
+
+    return decorate
+
+
+@_of("scenarios")
+def _scenarios() -> Listed:
     """Logical scenarios of the catalogue."""
-    from bridgegen.cli.terminal.tables import print_table
     from bridgegen.scenario.language.reader import load, names
 
-    rows = [(name, load(name).title) for name in names()]
-    print_table(("scenario", "title"), rows, as_json=as_json)
+    return ("scenario", "title"), [(name, load(name).title) for name in names()]
 
 
-@listing.command("packs")
-def list_packs(as_json: options.Json = False) -> None:
+@_of("packs")
+def _packs() -> Listed:
     """Logical scenarios of the packs, by regulation."""
-    from bridgegen.cli.terminal.tables import print_table
     from bridgegen.scenario.language.reader import load, pack_names
 
-    rows = [(name, load(name).title) for name in pack_names()]
-    print_table(("scenario", "title"), rows, as_json=as_json)
+    return ("scenario", "title"), [(name, load(name).title) for name in pack_names()]
 
 
-@listing.command("algorithms")
-def list_algorithms(as_json: options.Json = False) -> None:
+@_of("algorithms")
+def _algorithms() -> Listed:
     """Search algorithms."""
-    from bridgegen.cli.terminal.tables import print_table
     from bridgegen.search import algorithms as toolkit
 
     rows = []
     for kind in (toolkit.get(name) for name in toolkit.names()):
         settings = ", ".join(f"{name}={json.dumps(s.default)}" for name, s in kind.settings.items())
         rows.append((kind.name, kind.description, settings, kind.source))
-    print_table(("algorithm", "description", "settings", "source"), rows, as_json=as_json)
+    return ("algorithm", "description", "settings", "source"), rows
 
 
-@listing.command("drivers")
-def list_drivers(as_json: options.Json = False) -> None:
+@_of("drivers", entries=True)
+def _drivers() -> Listed:
     """Drivers of the ego, planners among them; of others.
 
     Of planners that others wrote: whether they are installed, or how to get them.
     """
-    from bridgegen.cli.terminal.tables import print_entries
     from bridgegen.drivers.drivers import HEAD, listed
 
-    print_entries(HEAD, listed(), as_json=as_json)
+    return HEAD, listed()
 
 
-@listing.command("simulators")
-def list_simulators(as_json: options.Json = False) -> None:
+@_of("simulators")
+def _simulators() -> Listed:
     """Simulators that can run the scenarios."""
-    from bridgegen.cli.terminal.tables import print_table
     from bridgegen.simulation.choice import SIMULATORS
 
     rows = [
@@ -70,15 +88,14 @@ def list_simulators(as_json: options.Json = False) -> None:
         )
         for simulator in SIMULATORS.values()
     ]
-    print_table(("simulator", "description", "options", "settings"), rows, as_json=as_json)
+    return ("simulator", "description", "options", "settings"), rows
 
 
-@listing.command("metrics")
-def list_metrics(as_json: options.Json = False) -> None:
+@_of("metrics")
+def _metrics() -> Listed:
     """Criticality metrics."""
     from bridgegen.assess.conflict.quantities import MEASURED, QUANTITIES
     from bridgegen.assess.metrics import TABLE_I
-    from bridgegen.cli.terminal.tables import print_table
 
     rows = [
         (
@@ -91,20 +108,28 @@ def list_metrics(as_json: options.Json = False) -> None:
         )
         for m in QUANTITIES.values()
     ]
-    head = ("metric", "unit", "more critical if", "description", "needs", "recorded")
-    print_table(head, rows, as_json=as_json)
+    return ("metric", "unit", "more critical if", "description", "needs", "recorded"), rows
 
 
-@listing.command("sight")
-def list_sight(as_json: options.Json = False) -> None:
+@_of("sight")
+def _sight() -> Listed:
     """Distances at which the reference driver detects.
 
     A car and a pedestrian, in each weather [m].
     """
-    from bridgegen.cli.terminal.tables import print_table
     from bridgegen.drivers.sight import HEAD, table
 
-    print_table(HEAD, list(table()), as_json=as_json)
+    return HEAD, list(table())
+
+
+@_of("exposures", entries=True)
+def _exposures() -> Listed:
+    """Examples of exposures; none is used unless named."""
+    from bridgegen.scenario.exposure import example_names, read_exposure
+
+    made = [(name, read_exposure(name)) for name in example_names()]
+    rows = [(name, f"of {exposure.scenario.name}", exposure.source) for name, exposure in made]
+    return ("exposure", "description", "source"), rows
 
 
 @listing.command("parameters")
@@ -123,3 +148,91 @@ def list_parameters(
     from bridgegen.scenario.language.reader import load
 
     print_parameters(load(scenario).table(), as_json=as_json)
+
+
+@listing.command("places")
+@with_map_folder()
+def places(
+    road_map: Annotated[
+        Path, typer.Argument(metavar="MAP", help="An OpenDRIVE map (.xodr), or its import (.owl).")
+    ],
+    scenario: Annotated[
+        str | None,
+        typer.Argument(
+            help="Say which places this scenario fits: a catalogue name, or a YAML file.",
+            autocompletion=completing("scenario"),
+        ),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw the map with its places: an .svg file, new.")
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """List the places of a map: junctions, roads and others.
+
+    Also roundabouts, and merges. With a scenario: which of them it fits (junctions at how many
+    rotations of its legs), and what the others lack. What fits can be searched (search SCENARIO
+    --map MAP --place ID).
+    """
+    from bridgegen.cli.terminal.tables import print_table
+    from bridgegen.jobs.search.places import places_of
+    from bridgegen.pages.map_picture import write_map_picture
+    from bridgegen.scenario.language.reader import load
+
+    found, model, warnings = places_of(road_map, load(scenario) if scenario else None)
+    for warning in warnings:
+        print(f"bridgegen: warning: {warning}", file=sys.stderr)
+    if scenario and not found and not as_json:
+        print(
+            f"{road_map}: nothing of the kind of place that {scenario} needs; "
+            f"'bridgegen list places {road_map}' lists what there is"
+        )
+    elif scenario:
+        print_table(
+            ("place", "what there is", "fits", "where, or what is missing"),
+            [
+                (fit.id, fit.size, _fits(fit), fit.placed or fit.lacks)
+                for fit in sorted(found, key=lambda fit: not fit.rotations)
+            ],
+            as_json=as_json,
+        )
+    else:
+        print_table(
+            ("place", "kind", "what there is", "roads"),
+            [(fit.id, fit.kind, fit.size, ", ".join(fit.legs)) for fit in found],
+            as_json=as_json,
+        )
+    if picture is not None:
+        fits = [fit for fit in found if fit.rotations]
+        junctions = {fit.id for fit in fits if fit.kind == "junction"} if scenario else None
+        roads = {fit.id: fit.legs[0] for fit in fits if fit.kind != "junction"}
+        write_map_picture(picture, model, junctions, roads)
+        # With --json, stdout holds JSON and nothing else.
+        print(picture, file=sys.stderr if as_json else sys.stdout)
+
+
+def _fits(place: "PlaceFit") -> str:
+    """Return whether a scenario fits a place, in a word: a junction at how many rotations."""
+    if not place.rotations:
+        return "no"
+    return (
+        "yes"
+        if place.kind in ("road", "merge")
+        else f"{place.rotations} of {len(place.legs)} rotations"
+    )
+
+
+@app.command()
+def doctor(as_json: options.Json = False) -> None:
+    """Examine this installation: versions, cache, extras.
+
+    Ends with status 2 if something keeps a search from working, or compiles at each start.
+    """
+    from bridgegen.cli.installation import examine
+    from bridgegen.cli.terminal.tables import print_table
+
+    found = list(examine())
+    rows = [(finding.subject, finding.value, finding.advice) for finding in found]
+    print_table(("subject", "value", "advice"), rows, as_json=as_json)
+    if any(finding.is_problem for finding in found):
+        raise typer.Exit(2)

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -34,21 +34,17 @@ Verbose = Annotated[
     ),
 ]
 
-OwnEgo = Annotated[
-    str | None,
-    typer.Option("--ego", help="The run's driver, if it is your own.", rich_help_panel=DRIVER),
-]
+
+def _text(spelling: str, help: str, panel: str) -> Any:
+    return typer.Option(spelling, help=help, rich_help_panel=panel)
+
+
+OwnEgo = Annotated[str | None, _text("--ego", "The run's driver, if it is your own.", DRIVER)]
 OwnBaseline = Annotated[
-    str | None,
-    typer.Option(
-        "--worse-than", help="The run's baseline, if it is your own driver.", rich_help_panel=DRIVER
-    ),
+    str | None, _text("--worse-than", "The run's baseline, if it is your own driver.", DRIVER)
 ]
 OwnAlgorithm = Annotated[
-    str | None,
-    typer.Option(
-        "--algorithm", help="The run's algorithm, if it is your own.", rich_help_panel=SEARCH
-    ),
+    str | None, _text("--algorithm", "The run's algorithm, if it is your own.", SEARCH)
 ]
 Ideal = Annotated[str | None, declaration("ideal", shown="the file's")]
 Vehicle = Annotated[str | None, declaration("vehicle")]
@@ -72,7 +68,7 @@ Others = Annotated[str | None, declaration("others", shown="the file's")]
 Simulator = Annotated[
     str | None,
     typer.Option(
-        help="Simulator, see 'bridgegen list simulators'.",
+        help="See 'bridgegen list simulators'.",
         show_default="embedded",
         rich_help_panel=SIMULATOR,
         autocompletion=completing("simulator"),
@@ -87,21 +83,12 @@ Screen = Annotated[
         autocompletion=completing("simulator"),
     ),
 ]
+_SETTING = "A setting of the {}, NAME=VALUE; may be repeated."
 ScreenSettings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--screen-set",
-        help="A setting of the screen, NAME=VALUE; may be repeated.",
-        rich_help_panel=SIMULATOR,
-    ),
+    list[str] | None, _text("--screen-set", _SETTING.format("screen"), SIMULATOR)
 ]
 SimulatorSettings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--simulator-set",
-        help="A setting of the simulator, NAME=VALUE; may be repeated.",
-        rich_help_panel=SIMULATOR,
-    ),
+    list[str] | None, _text("--simulator-set", _SETTING.format("simulator"), SIMULATOR)
 ]
 RoadMap = Annotated[Path | None, declaration("road_map")]
 Junction = Annotated[str | None, declaration("junction")]
@@ -124,14 +111,20 @@ RunWorkers = Annotated[
         rich_help_panel=SEARCH,
     ),
 ]
-FailIf = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="End with exit status 3 if this holds, e.g. 'r_critic > 0.1'; may be repeated.",
+
+
+def _fail_if(what: str) -> Any:
+    return typer.Option(
+        "--fail-if",
+        help=f"End with exit status 3 if this holds{what}; may be repeated.",
         show_default=False,
         rich_help_panel=OUTPUT,
-    ),
-]
+    )
+
+
+FailIf = Annotated[list[str] | None, _fail_if(", e.g. 'r_critic > 0.1'")]
+FileFailIf = Annotated[list[str] | None, _fail_if(" of its metrics, e.g. 'd_min < 2 and v_d >= 1'")]
+ConfirmFailIf = Annotated[list[str] | None, _fail_if(", e.g. 'confirmed < 0.95'")]
 Criterion = Annotated[
     list[str] | None,
     typer.Option(
@@ -147,25 +140,6 @@ Exposure = Annotated[
         help="How its parameters are distributed on the road: a file (.yaml), an example of "
         "'bridgegen list exposures', or uniform.",
         show_default="the exposure in the scenario's file",
-    ),
-]
-FileFailIf = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--fail-if",
-        help="End with exit status 3 if this holds of its metrics, e.g. 'd_min < 2 and v_d >= 1'; "
-        "may be repeated.",
-        show_default=False,
-        rich_help_panel=OUTPUT,
-    ),
-]
-ConfirmFailIf = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--fail-if",
-        help="End with exit status 3 if this holds, e.g. 'confirmed < 0.95'; may be repeated.",
-        show_default=False,
-        rich_help_panel=OUTPUT,
     ),
 ]
 Junit = Annotated[

@@ -9,14 +9,13 @@ import typer
 from bridgegen.base.errors import InputError
 from bridgegen.cli import options
 from bridgegen.cli.app import app
-from bridgegen.cli.groups import SEARCH
 from bridgegen.engine.options.forms import read_names
 
 PACKAGE = "bridgegen_reproduction"
 """Package of the reproductions, as a name, since nothing of this package imports it."""
 
 
-@app.command(rich_help_panel=SEARCH)
+@app.command(hidden=True)
 def reproduce(
     quick: Annotated[
         bool, typer.Option("--quick", help="One seed of everything, in a minute or two.")

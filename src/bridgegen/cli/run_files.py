@@ -16,6 +16,8 @@ import typer
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import BridgeGenError, FileFormatError, InputError, StorageError
+from bridgegen.cli.declared import with_parameters
+from bridgegen.cli.groups import RENAMED_OPTIONS
 from bridgegen.engine.options import SearchOptions, file_forms, options_of
 from bridgegen.engine.options.file_forms import FileForm
 
@@ -204,7 +206,9 @@ def _read_run(
     values = {}
     for spelling, value in data.items():
         where = document.at((*place, spelling))
-        key = keys.get(spelling)
+        key = keys.get(spelling) or keys.get(
+            RENAMED_OPTIONS["suite"].get(f"--{spelling}", "").removeprefix("--")
+        )
         if key is None:
             hint = nearest(spelling, keys) or f"; known: {', '.join(keys)}"
             problems.append(f"unknown key '{spelling}' in {label}{hint} ({where})")
@@ -393,13 +397,7 @@ def with_run_files(
         context = inspect.Parameter(
             "context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context
         )
-        parameters = [context, *signature.parameters.values()]
-        # typer makes the options of the signature: it has to see the context, too.
-        wrapper.__signature__ = signature.replace(  # type: ignore[attr-defined]
-            parameters=parameters
-        )
-        wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-        return wrapper
+        return with_parameters(wrapper, [context, *signature.parameters.values()])
 
     return decorate
 

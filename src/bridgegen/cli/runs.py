@@ -21,7 +21,6 @@ from bridgegen.cli.connection import (
     with_map_folder,
 )
 from bridgegen.cli.declared import with_declared_options
-from bridgegen.cli.groups import FILES, RESULTS, SEARCH
 from bridgegen.cli.run_files import (
     FiledRun,
     Key,
@@ -103,7 +102,7 @@ def search_all(
         raise typer.Exit(status)
 
 
-@app.command(rich_help_panel=SEARCH)
+@app.command()
 @with_map_folder(WHAT)
 @with_run_files(search_all)
 @with_connection_options
@@ -127,7 +126,7 @@ def search(
         Path | None,
         typer.Option(
             help="Folder of the run, new.",
-            show_default="runs/SCENARIO-DRIVER, or -2, -3 …",
+            show_default="runs/SCENARIO-DRIVER",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
@@ -168,7 +167,7 @@ def run_file_schema() -> dict[str, object]:
     return schema(keys_of(search))
 
 
-@app.command(rich_help_panel=FILES)
+@app.command()
 def new(
     name: Annotated[
         str,
@@ -189,7 +188,7 @@ def new(
     print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
 
 
-@app.command(rich_help_panel=SEARCH)
+@app.command()
 @with_map_folder()
 @with_connection_options
 def resume(
@@ -226,81 +225,7 @@ def resume(
     _end(criteria.judge(run))
 
 
-@app.command(rich_help_panel=RESULTS)
-def coverage(
-    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
-    bins: Annotated[
-        int, typer.Option(help="Equal bins per parameter; whole numbers have one each.")
-    ] = 5,
-    strength: Annotated[
-        int, typer.Option(help="Maximum number of parameters in a combination of bins: 1, 2, 3.")
-    ] = 3,
-    exposure: common.Exposure = None,
-    as_json: common.Json = False,
-) -> None:
-    """Show which bins of the parameters a run evaluated.
-
-    Also shows which combinations of bins, and which of them are critical; with an
-    exposure, how much of what is met on the road these are.
-    """
-    from bridgegen.cli.terminal.search import print_coverage
-    from bridgegen.jobs.search.coverage import coverage_of
-
-    settings, found = coverage_of(run, bins=bins, strength=strength, exposure=exposure)
-    print_coverage(run, settings, found, as_json=as_json)
-
-
-@app.command(rich_help_panel=RESULTS)
-@with_connection_options
-def regions(
-    run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],
-    samples: Annotated[
-        int, typer.Option(help="Fresh random scenarios to simulate in each region.")
-    ] = 300,
-    at_least: Annotated[
-        float,
-        typer.Option(
-            help="The share of critical scenarios that makes a region critical; the fresh ones "
-            "must show it with 95 % confidence."
-        ),
-    ] = 0.5,
-    seed: Annotated[
-        int | None,
-        typer.Option(help="Seed of the fresh scenarios.", show_default="the run's"),
-    ] = None,
-    exposure: common.Exposure = None,
-    ego: common.OwnEgo = None,
-    worse_than: common.OwnBaseline = None,
-    connection: Connection = NO_CONNECTION,
-    workers: common.Workers = None,
-    as_json: common.Json = False,
-) -> None:
-    """Find regions in which most scenarios are critical.
-
-    Each is a readable rule, verified by fresh scenarios; with an exposure, with the
-    share of encounters that lie in it.
-    """
-    from bridgegen.cli.terminal.regions import RegionsProgress, print_regions
-    from bridgegen.jobs.search.regions import regions_of
-
-    with RegionsProgress() as live:
-        found = regions_of(
-            run,
-            ego=ego,
-            worse_than=worse_than,
-            simulator=read_access(connection),
-            samples=samples,
-            at_least=at_least,
-            seed=seed,
-            exposure=exposure,
-            workers=workers,
-            stage=live.stage,
-            progress=live.progress,
-        )
-    print_regions(found, as_json=as_json)
-
-
-@app.command(rich_help_panel=FILES)
+@app.command()
 @with_map_folder()
 @with_connection_options
 def simulate(
@@ -419,38 +344,6 @@ def simulate(
     else:
         print_file_result(file, result)
     _end(criteria.judge(file, result))
-
-
-@app.command("check-driver", rich_help_panel=SEARCH)
-def check_driver(
-    driver: Annotated[
-        str,
-        typer.Argument(
-            help="module:Class, file.py:Class, file.py:function, file.fmu, connect:HOST:PORT, "
-            "unix:PATH, 'exec:COMMAND'."
-        ),
-    ],
-    scenario: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Scenario to drive in; may be repeated.",
-            show_default="four that ship",
-            autocompletion=completing("scenario"),
-        ),
-    ] = None,
-    time_limit: common.TimeLimit = None,
-    as_json: common.Json = False,
-) -> None:
-    """Check that your driver gives repeatable results.
-
-    A scenario's result must depend on that scenario alone.
-    """
-    from bridgegen.cli.terminal.files import print_checks
-    from bridgegen.jobs.search.driver_contract import SCENARIOS, check_driver
-
-    checks = check_driver(driver, scenario or SCENARIOS, time_limit=time_limit)
-    if not print_checks(checks, as_json=as_json):
-        raise typer.Exit(1)
 
 
 def _end(outcomes: "Sequence[Outcome]") -> None:

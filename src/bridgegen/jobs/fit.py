@@ -59,7 +59,7 @@ def write_fit(
         StorageError: another file is in a place, or it cannot be written.
     """
     if others is not None and others not in _OTHERS:
-        raise InputError(f"others must be {' or '.join(_OTHERS)}, got '{others}'")
+        raise InputError(f"--without-column must be {' or '.join(_OTHERS)}, got '{others}'")
     page = page or out.with_suffix(".html")
     refuse_other_file(out)
     refuse_other_page(page)

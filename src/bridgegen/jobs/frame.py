@@ -287,7 +287,6 @@ class Job:
         figures: what ``--fail-if`` can compare, by name: what each means.
         example: of a fail condition.
         fails: what fails it without conditions, in words; "" for nothing.
-        panel: of ``bridgegen --help`` that lists it.
         has_folder: whether ``--out`` names a folder, of which each run of a run file gets its own.
     """
 
@@ -298,8 +297,12 @@ class Job:
     figures: Mapping[str, str]
     example: str
     fails: str = ""
-    panel: str = "Search"
     has_folder: bool = True
+
+    @property
+    def last_word(self) -> str:
+        """The name in its group; also of folders and schemas."""
+        return self.name.split()[-1]
 
     def run(self, options: JobOptions) -> JobResult:
         """Do it."""

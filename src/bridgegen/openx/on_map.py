@@ -199,7 +199,7 @@ def _shortly(reasons: list[str]) -> Iterator[str]:
     more = len(reasons) - _SHOWN
     yield from reasons if more <= 1 else reasons[:_SHOWN]
     if more > 1:
-        yield f"{more} more places are left out; what each lacks: bridgegen places MAP SCENARIO"
+        yield f"{more} more places are left out; see: bridgegen list places MAP SCENARIO"
 
 
 def _turned(scenario: LogicalScenario, road_map: RoadMap) -> RoadMap:

@@ -44,7 +44,8 @@ def parse_xml(source: Path | bytes, place: str | None = None) -> etree._Element:
     try:
         root = etree.fromstring(data, parser)
     except (etree.XMLSyntaxError, ValueError) as error:
-        raise FileFormatError(f"{place}: not well-formed XML: {error}") from None
+        text = str(error).partition(" (<string>")[0]
+        raise FileFormatError(f"{place}: not well-formed XML: {text}") from None
     # Refused, and not ignored: a file whose meaning depends on entities would be read as another
     # one.
     if root.getroottree().docinfo.doctype:

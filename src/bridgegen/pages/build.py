@@ -48,8 +48,8 @@ from bridgegen.search.screened import NOTE
 from bridgegen.search.triage.record import Mode, Triage
 
 SAMPLE = 50_000
-"""Number of random scenarios that estimate feasibility: fewer than `bridgegen coverage` draws, for
-speed."""
+"""Number of random scenarios that estimate feasibility: fewer than `bridgegen analyse coverage`
+draws, for speed."""
 
 INDEPENDENT = "random"
 """The algorithm whose rows are independent draws."""

@@ -187,7 +187,7 @@ def report_page(data: ReportData, *, live: bool = False) -> bytes:
 
     Args:
         data: of the report.
-        live: whether ``bridgegen view`` serves it, so that it can request updates.
+        live: whether ``bridgegen open`` serves it, so that it can request updates.
     """
     title = f"{data.summary.scenario}: {data.summary.title}"
     modules, connect = (SERVED, "self") if live else (REPORT, "none")

@@ -1,4 +1,4 @@
-"""The contract of drivers: what ``bridgegen check-driver`` checks."""
+"""The contract of drivers: what ``bridgegen validate`` checks."""
 
 from collections.abc import Sequence
 from functools import cache

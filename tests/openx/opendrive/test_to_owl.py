@@ -280,13 +280,13 @@ def test_the_command(
 ) -> None:
     road_map = tmp_path / "map.xodr"
     road_map.write_bytes(to_xml(crossroads()))
-    assert run(monkeypatch, "import", road_map) == 0
+    assert run(monkeypatch, "ontology", "import", road_map) == 0
     assert capsys.readouterr().out.strip() == str(tmp_path / "map.owl")
     assert run(monkeypatch, "validate", tmp_path / "map.owl") == 0
     assert "valid" in capsys.readouterr().out
     (tmp_path / "sub").mkdir()
     out = tmp_path / "sub" / "other.owl"
-    assert run(monkeypatch, "import", road_map, "--out", out) == 0
+    assert run(monkeypatch, "ontology", "import", road_map, "--out", out) == 0
     network = load(out).one("RoadNetwork")
     assert load(out).text(network, "has_map_file") == "../map.xodr"
 
@@ -295,18 +295,18 @@ def test_the_command_refuses(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     road_map = tmp_path / "map.xodr"
-    assert run(monkeypatch, "import", road_map) == 2
+    assert run(monkeypatch, "ontology", "import", road_map) == 2
     assert "cannot be read" in capsys.readouterr().err
     road_map.write_bytes(b"<OpenSCENARIO/>")
-    assert run(monkeypatch, "import", road_map) == 2
+    assert run(monkeypatch, "ontology", "import", road_map) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1
     approve(err, "OpenDRIVE")
     road_map.write_bytes(FURNISHED)
-    assert run(monkeypatch, "import", road_map, "--out", tmp_path / "no" / "x.owl") == 2
+    assert run(monkeypatch, "ontology", "import", road_map, "--out", tmp_path / "no" / "x.owl") == 2
     assert "cannot be written" in capsys.readouterr().err
     (tmp_path / "map.owl").write_text("mine")
-    assert run(monkeypatch, "import", road_map) == 2
+    assert run(monkeypatch, "ontology", "import", road_map) == 2
     assert "exists already" in capsys.readouterr().err
     assert (tmp_path / "map.owl").read_text() == "mine"
     with pytest.raises(StorageError):

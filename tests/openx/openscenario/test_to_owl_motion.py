@@ -270,17 +270,20 @@ def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
 
 def test_the_command(folder, monkeypatch, capsys):
     file = folder / "their.xosc"
-    assert run(monkeypatch, "import", file, "--ego", "Hero", "--strict") == 2
+    assert run(monkeypatch, "ontology", "import", file, "--entity", "Hero", "--strict") == 2
     err = capsys.readouterr().err
     assert err.count("cannot be said in the ontology") == len(KNOWN)
-    assert run(monkeypatch, "import", file, "--ego", "Hero", "--strict", "--partial") == 0
+    assert (
+        run(monkeypatch, "ontology", "import", file, "--entity", "Hero", "--strict", "--partial")
+        == 0
+    )
     out = capsys.readouterr()
     assert out.out.strip() == str(folder / "their.owl")
     assert out.err.count("bridgegen: note: left out: ") == len(KNOWN)
     assert run(monkeypatch, "validate", folder / "their.owl") == 0
-    assert run(monkeypatch, "import", file, "--ego", "Hero", "--partial") == 2
+    assert run(monkeypatch, "ontology", "import", file, "--entity", "Hero", "--partial") == 2
     assert "exists already" in capsys.readouterr().err
-    assert run(monkeypatch, "import", folder / "map.xodr", "--partial") == 2
+    assert run(monkeypatch, "ontology", "import", folder / "map.xodr", "--partial") == 2
     assert "only a scenario" in capsys.readouterr().err
 
 

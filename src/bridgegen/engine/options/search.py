@@ -52,8 +52,8 @@ class PipelineOptions(Declared):
         metadata=option(
             TEXT,
             "Driver of the ego, see 'bridgegen list drivers'; or your own: module:Class, "
-            "file.py:Class (or a compiled driver's function), file.fmu; or where it runs: "
-            "connect:HOST:PORT, unix:PATH, 'exec:COMMAND'.",
+            "file.py:Class (or :function, compiled), file.fmu, connect:HOST:PORT, unix:PATH, "
+            "'exec:COMMAND'.",
             shown="the scenario's choice",
             group=OF_DRIVER,
             names="driver",
@@ -223,9 +223,9 @@ class CommonOptions(PipelineOptions):
         default=None,
         metadata=option(
             TERMS,
-            "What to optimise: harm, paper, or metrics with their weights (without, for entropy "
-            "weights).",
-            hint="E.g. d_min=0.8,v_d=0.2, or d_min,ttc with --weights entropy.",
+            "What to optimise: harm, paper, or metrics with their weights (none for --weights "
+            "entropy).",
+            hint="E.g. d_min=0.8,v_d=0.2.",
             shown="the scenario's",
             group=OBJECTIVE,
             names="objective",
@@ -320,8 +320,8 @@ class SearchOptions(CommonOptions):
         default="auto",
         metadata=option(
             TEXT,
-            "Search algorithm, see 'bridgegen list algorithms'; auto, chosen by the budget; or "
-            "your own: module:Class, file.py:Class.",
+            "See 'bridgegen list algorithms'; auto, chosen by the budget; or your own: "
+            "module:Class, file.py:Class.",
             group=SEARCH,
             names="algorithm",
         ),

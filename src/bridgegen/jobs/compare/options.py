@@ -155,7 +155,7 @@ class CompareOptions(CommonOptions, SimulatingOptions):
 
 
 JOB = Job(
-    name="compare",
+    name="benchmark algorithms",
     options=CompareOptions,
     function="bridgegen.jobs.compare.comparison:compare",
     help="""Compare algorithms over several seeds.

@@ -135,7 +135,7 @@ class Plan:
             seeds=self.seeds,
             budget=self.budget,
         )
-        return command_of("compare", given, self.out)
+        return command_of("benchmark algorithms", given, self.out)
 
     def identity(self) -> dict[str, Any]:
         """Return what must be equal in all runs of one folder, as JSON's types."""

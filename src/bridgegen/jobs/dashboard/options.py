@@ -80,6 +80,5 @@ JOB = Job(
         "problems": "folders and scenarios that cannot be read",
     },
     example="new > 0",
-    panel="Look at results",
     has_folder=False,
 )

@@ -118,5 +118,4 @@ JOB = Job(
         "mined": "logical scenarios that are made of events",
     },
     example="near_misses > 10",
-    panel="Files",
 )

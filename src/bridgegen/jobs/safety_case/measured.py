@@ -119,7 +119,7 @@ def _space(facts: Facts, numbers: Numbers) -> None:
 
 
 def _coverage(facts: Facts, numbers: Numbers) -> None:
-    again = shlex.join(["bridgegen", "coverage", facts.run.folder.resolve().name])
+    again = shlex.join(["bridgegen", "analyse", "coverage", facts.run.folder.resolve().name])
     for way in facts.coverage.ways:
         name = {1: "bins", 2: "pairs"}[way.strength]
         numbers.add(f"{name}_all", way.total)

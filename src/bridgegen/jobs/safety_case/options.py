@@ -44,5 +44,4 @@ JOB = Job(
     },
     example="not_supported > 0",
     fails="a run could not be judged: it supports nothing",
-    panel="Look at results",
 )

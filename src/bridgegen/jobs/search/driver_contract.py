@@ -1,4 +1,4 @@
-"""The contract of a user's driver, tested: ``bridgegen check-driver module:Class``.
+"""The contract of a user's driver, tested: ``bridgegen validate module:Class``.
 
 A scenario's result must depend on that scenario alone. So a driver must give the same answers for a
 scenario whatever else is in the batch, in any order and at each repetition, and must forget its

@@ -17,7 +17,7 @@ from bridgegen.base.errors import (
     UnknownNameError,
     UnsupportedError,
 )
-from bridgegen.drivers.drivers import CODES
+from bridgegen.drivers.drivers import CODES, DRIVERS
 from bridgegen.drivers.noise import noise_key
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.engine.stated import keyed
@@ -38,7 +38,7 @@ from bridgegen.simulation.embedded.compiler import compile_storyboard
 
 EXPORT = "export"
 
-Flavour = Callable[[osc.OpenScenario, Path], osc.OpenScenario]
+Flavour = Callable[[osc.OpenScenario, Path, str | None], osc.OpenScenario]
 
 
 def export(
@@ -48,6 +48,7 @@ def export(
     scenarios: Sequence[str] = (),
     out: Path | None = None,
     town: str | None = None,
+    ego: str | None = None,
     notes: list[str] | None = None,
 ) -> list[Path]:
     """Write scenarios in another flavour, each beside a copy of its map.
@@ -63,6 +64,8 @@ def export(
         out: the folder to write to; ``export/FLAVOUR`` in the run's or the file's by default.
         town: for the flavour "carla", CARLA's own map to run on, which is then named instead of
             a file; that of a run on a map called ``TownNN.xodr`` by default.
+        ego: the driver of the files, which has to be named where it is the user's own and drives
+            for the flavour ("recorded", "carla").
         notes: takes a sentence for each file in which participants other than the ego have a
             driver that the tools which read the flavour do not know.
 
@@ -90,7 +93,7 @@ def export(
     folder = out or base / EXPORT / flavour
     found = []
     for path in paths:
-        found += _export(path, FLAVOURS[flavour], folder, town)
+        found += _export(path, FLAVOURS[flavour], folder, town, ego)
         if notes is not None:
             notes += _ignored_drivers(path, flavour)
     beside = {folder / name: data() for name, data in _BESIDE.get(flavour, {}).items()}
@@ -103,7 +106,8 @@ def _ignored_drivers(path: Path, flavour: str) -> list[str]:
     if flavour == RECORDED:  # their motion is in the file
         return []
     scenario, _ = _read(path)
-    program = compile_storyboard(scenario, str(path))
+    # Any driver of the ego: the question is about the others.
+    program = compile_storyboard(scenario, str(path), driver=DRIVERS["route-follower"])
     names = ", ".join(f"'{program.names[e]}'" for e in program.attends.tolist())
     if not names:
         return []
@@ -156,11 +160,13 @@ def _read(path: Path) -> tuple[osc.OpenScenario, OpenDrive]:
     return prepared(scenario, roads, str(path)), roads
 
 
-def _export(path: Path, flavour: Flavour, folder: Path, town: str | None) -> list[Path]:
+def _export(
+    path: Path, flavour: Flavour, folder: Path, town: str | None, ego: str | None
+) -> list[Path]:
     scenario, roads = _read(path)
     if problems := validate.problems(scenario, roads):
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
-    made, maps = flavour(scenario, path), []
+    made, maps = flavour(scenario, path, ego), []
     if scenario.road_network.logic_file is not None and town is None:
         maps = [logic_path(scenario, path)]
     made = _moved(made, path, [item.name for item in maps], folder)
@@ -206,7 +212,7 @@ def _moved(
     )
 
 
-def _resolved(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+def _resolved(scenario: osc.OpenScenario, path: Path, ego: str | None = None) -> osc.OpenScenario:
     made = resolved(_keyed(scenario), str(path))
     return to_version(made, least_version(made), str(path))
 
@@ -219,14 +225,14 @@ def _keyed(scenario: osc.OpenScenario) -> osc.OpenScenario:
     return keyed(scenario, str(noise_key(numbers(scenario), 1)[0]))
 
 
-def _recorded(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+def _recorded(scenario: osc.OpenScenario, path: Path, ego: str | None) -> osc.OpenScenario:
     """Return a scenario as its own ego drives it in the embedded simulator."""
-    return recorded(_resolved(scenario, path), _recording(path))
+    return recorded(_resolved(scenario, path), _recording(path, ego))
 
 
-def _recording(path: Path) -> Recording:
+def _recording(path: Path, ego: str | None) -> Recording:
     """Return what the embedded simulator records of a file until it stops."""
-    result = simulate_file(path)
+    result = simulate_file(path, ego=ego)
     if result.status != "ok":
         raise InputError(f"{path}: its simulation must succeed to be recorded: {result.status}")
     rollout = result.rollout
@@ -246,16 +252,18 @@ def _recording(path: Path) -> Recording:
     )
 
 
-def _in_version(version: str, scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+def _in_version(
+    version: str, scenario: osc.OpenScenario, path: Path, ego: str | None
+) -> osc.OpenScenario:
     return to_version(scenario, version, str(path))
 
 
-def _carla(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+def _carla(scenario: osc.OpenScenario, path: Path, ego: str | None) -> osc.OpenScenario:
     """Return a scenario for CARLA's ScenarioRunner, which all but its ego go through again."""
     plain = _resolved(scenario, path)
-    name = f"{plain.file_header.description}-{path.stem}"
+    name, recording = f"{plain.file_header.description}-{path.stem}", _recording(path, ego)
     try:
-        return for_scenario_runner(plain, _recording(path), roads_of(scenario, path), name)
+        return for_scenario_runner(plain, recording, roads_of(scenario, path), name)
     except UnsupportedError as error:
         raise UnsupportedError(*(f"{path}: {problem}" for problem in error.problems)) from None
 

@@ -100,7 +100,7 @@ def regions_of(
     with open_workers(workers) as pool:
         pipeline = pipeline_of(
             run,
-            "regions",
+            "analyse regions",
             ego=ego,
             worse_than=worse_than,
             compares=True,

@@ -144,4 +144,4 @@ def _hashes(settings: Settings, results: str | None) -> dict[str, str]:
 
 def view_command(folder: Path) -> str:
     """Return the command line that serves a run's page."""
-    return shlex.join(["bridgegen", "view", str(folder)])
+    return shlex.join(["bridgegen", "open", str(folder)])

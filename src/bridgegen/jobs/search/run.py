@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -33,6 +33,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REPORT = "report.html"
+
+
+def load(name_or_path: str | Path) -> Any:
+    """Load a scenario; or a run, as `Run` does.
+
+    Args:
+        name_or_path: a name of the catalogue or of a pack ("r157/cut-in"), the path of a scenario's
+            file (.yaml, .xosc), or the folder of a run.
+
+    Raises:
+        UnknownNameError: no such name in the catalogue or the packs.
+        InputError: the file or folder is missing, or breaks rules; all of them, with their lines.
+    """
+    from bridgegen.jobs.search.scenarios import load as load_scenario
+
+    return Run(name_or_path) if Path(name_or_path).is_dir() else load_scenario(name_or_path)
 
 
 class Run:

@@ -140,7 +140,7 @@ class FailingDriver:
         reasons = Run.of(self._store, self._store.read()).failures
         of_drivers = tuple(STATUS_MESSAGES[status] for status in FAILURES.values())
         reason, count = next(pair for pair in reasons.items() if pair[0].startswith(of_drivers))
-        check = f"bridgegen check-driver {shlex.quote(self._driver)}"
+        check = f"bridgegen validate {shlex.quote(self._driver)}"
         raise InputError(
             f"the driver '{self._driver}' failed in all {self._failed} scenarios that it was to "
             f"drive, so the search ended after {len(self._store)} of {self._budget} evaluations; "

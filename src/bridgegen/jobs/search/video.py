@@ -87,7 +87,7 @@ def _of_run(
         name = names.get(evaluation - 1, f"evaluation-{evaluation}")
         out = out or Path(f"{run.folder.resolve().name}-{name}.gif")
         refuse_path(out)
-        pipeline = pipeline_of(run, "video", ego=ego)
+        pipeline = pipeline_of(run, "export --flavour video", ego=ego)
         (playback,) = playbacks(pipeline, rows, [(name, evaluation - 1, ())], brief=True)
     return playback, out
 

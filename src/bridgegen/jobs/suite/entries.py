@@ -11,6 +11,7 @@ from bridgegen.base.errors import BridgeGenError, InputError
 from bridgegen.jobs.suite.rows import NO_MATRIX
 from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
 from bridgegen.results.failures import FailureFile, failure_of
+from bridgegen.scenario.language.parameters import nearest
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES
 from bridgegen.scenario.language.reader import load, pack_names
 from bridgegen.scenario.language.reader import names as catalogue_names
@@ -107,7 +108,8 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
             for name in some:
                 found.setdefault(name, Entry(name, name))
         else:
-            problems.append(f"{item}: no such file, folder, pack or scenario that ships")
+            near = nearest(str(item), [*shipped, *(name.partition("/")[0] for name in shipped)])
+            problems.append(f"{item}: no such file, folder, pack or scenario that ships{near}")
     if problems:
         raise InputError(*problems)
     if not found:

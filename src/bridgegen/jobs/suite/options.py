@@ -120,7 +120,7 @@ class SuiteOptions(ScenariosOptions):
         default=EMBEDDED,
         metadata=option(
             CHOICE,
-            "Simulator, see 'bridgegen list simulators'.",
+            "See 'bridgegen list simulators'.",
             shown="embedded",
             group=SIMULATOR,
             names="simulator",
@@ -131,7 +131,7 @@ class SuiteOptions(ScenariosOptions):
         metadata=option(
             FLAG,
             "Draw the preventability map of each scenario that has a grid of its own.",
-            spelling="--map",
+            spelling="--preventability",
             group=OUTPUT,
         ),
     )

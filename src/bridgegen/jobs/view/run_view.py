@@ -47,7 +47,7 @@ class RunView:
         self._run = Run(folder)
         self.folder, self.settings = self._run.folder, self._run.settings
         self._rows: Recorded | None = None
-        self._pipeline = pipeline_of(self._run, "view", ego=ego, simulator=simulator)
+        self._pipeline = pipeline_of(self._run, "open", ego=ego, simulator=simulator)
         # The server's threads share the rows in memory, which each request may extend.
         self._lock = threading.Lock()
 

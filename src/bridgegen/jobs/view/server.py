@@ -193,7 +193,7 @@ class _Handler(BaseHTTPRequestHandler):
         token, slash, rest = self.path.removeprefix("/").partition("/")
         # The token keeps out other users of the machine; compared in constant time.
         if not (slash and hmac.compare_digest(token.encode(), self.server.token.encode())):
-            text = b"The address must be the one that 'bridgegen view' printed, with its token.\n"
+            text = b"The address must be the one that 'bridgegen open' printed, with its token.\n"
             return Answer(HTTPStatus.FORBIDDEN, "text/plain", text)
         with self.server.turn:
             return None if self._is_gone() else answer(self.server.site, f"/{rest}")

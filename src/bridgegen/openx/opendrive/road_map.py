@@ -91,8 +91,8 @@ def load_map(
 
     Args:
         path: an OpenDRIVE file (or a map of CARLA's by its name), or the ``.owl`` that
-            ``bridgegen import`` made of one: the file that it names is read then, which must be
-            what it was.
+            ``bridgegen ontology import`` made of one: the file that it names is read then, which
+            must be what it was.
         junction: the id of the junction, or of the stretch of road; where the map has several,
             it must be named, or "best": the one that fits the scenario and is most like its own;
             or "all": each that fits, at each rotation of its legs.
@@ -151,8 +151,8 @@ def map_of(owl: Path) -> tuple[Path, str]:
     ]
     if len(named) != 1 or named[0][0] is None or individuals.of_class("Scenario"):
         raise FileFormatError(
-            f"{owl}: it must be a map that 'bridgegen import' made individuals of, with the file "
-            "that it was (has_map_file), and no scenario"
+            f"{owl}: it must be a map that 'bridgegen ontology import' made individuals of, with "
+            "the file that it was (has_map_file), and no scenario"
         )
     ((file, digest),) = named
     if digest is None:

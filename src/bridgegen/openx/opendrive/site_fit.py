@@ -383,7 +383,7 @@ def fitting_sites(
         return found
     raise UnsupportedError(
         f"{scenario.name} fits no {kind_of_place(scenario)} of {map_name or 'the map'}; "
-        "what each lacks: bridgegen places MAP SCENARIO"
+        "what each lacks: bridgegen list places MAP SCENARIO"
     )
 
 

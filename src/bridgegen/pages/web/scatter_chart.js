@@ -20,7 +20,7 @@ export const NOT_SEARCHED = { evaluation: "Evaluation", iteration: "Iteration" }
 
 const PLAYS = {
   kept: "Click to play it", packed: "Click to play it", served: "Click to simulate and play it",
-  none: "Click for its figures; to play it: bridgegen view",
+  none: "Click for its figures; to play it: bridgegen open",
 };
 
 function valuesOf(name) {

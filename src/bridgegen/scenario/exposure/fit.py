@@ -176,8 +176,8 @@ def fit_exposure(
     rest = [name for name in scenario.space().variables if name not in columns]
     if rest and others is None:
         raise InputError(
-            f"others must say what the searched parameters are that have no column, uniform or "
-            f"default: {', '.join(rest)}"
+            f"{len(rest)} searched parameters have no column: add --without-column uniform or "
+            f"default (in Python others=…): {', '.join(rest)}"
         )
     rows = len(next(iter(columns.values())))
     inside, outside = _inside(scenario, columns)

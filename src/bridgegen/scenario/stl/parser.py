@@ -99,8 +99,9 @@ def _check_times(reading: f.Part, text: str, *, inside: bool) -> None:
                 f"got '{text}' (column {reading.column})"
             )
         raise InputError(
-            f"{reading.name} is one number of the whole scenario, so it is compared outside "
-            f"always(...), eventually(...) and the like, got '{text}' (column {reading.column})"
+            f"{reading.name} is no signal, and always(...), eventually(...) and the like compare "
+            "signals (ego.v, gap to any); a metric, one number of the whole scenario, is compared "
+            f"outside, got '{text}' (column {reading.column})"
         )
     for part in f.parts(reading):
         _check_times(

@@ -39,7 +39,7 @@ def read_record(path: Path) -> Mapping[str, Any] | None:
         return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise FileFormatError(
-            f"{path}: must be what 'bridgegen regions' writes, and {_reason(error)}; "
+            f"{path}: must be what 'bridgegen analyse regions' writes, and {_reason(error)}; "
             "run that again, or delete the file"
         ) from None
     return record  # type: ignore[no-any-return]

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 LIBRARY = "ESMINI_LIB"
 """Environment variable with the path of the library, if no option names it."""
 
+RELEASES = "https://github.com/esmini/esmini/releases"
+"""Where the esmini project publishes it, in the folder ``bin`` of an archive."""
+
 ROWS = 16
 """Number of rows of a chunk: they share their preparation."""
 
@@ -52,8 +55,8 @@ def library_of(access: Mapping[str, object]) -> Path:
     named = access.get("--esmini-lib") or os.environ.get(LIBRARY)
     if not named:
         raise InputError(
-            "the simulator esmini needs its library, libesminiLib.so of esmini 3: name it by "
-            f"--esmini-lib, or in the environment variable {LIBRARY}"
+            "the simulator esmini needs its library, libesminiLib.so of esmini 3 "
+            f"({RELEASES}): name it by --esmini-lib, or in the environment variable {LIBRARY}"
         )
     return Path(str(named))
 
