@@ -8,10 +8,10 @@ const CELLS = 60;
 const COARSE = [8, 4, 2, 1]; // strides of the passes: the whole is seen at once, then in full
 const AT_ONCE = 24; // cells, some milliseconds
 
-/** Verdicts by what they are called, with their colour. */
+/** Verdicts by what they are called, with the name of their colour. */
 const SHADES = [
-  ["no conflict", () => palette.soft], ["conflict that does not count", () => palette.plain],
-  ["near miss or violation", () => palette.critical], ["collision", () => palette.hit],
+  ["no conflict", "soft"], ["conflict that does not count", "plain"],
+  ["near miss or violation", "critical"], ["collision", "hit"],
 ];
 
 // Lets the page draw and hear; a timer would wait for 4 ms each time.
@@ -48,12 +48,13 @@ export class ExploreMap {
     this.note = element("p", { class: "muted small", role: "status" });
     const legend = SHADES.map(([name, colour]) => {
       const dot = element("i", { "aria-hidden": "true" });
-      dot.style.background = colour();
+      dot.style.background = `var(--${colour})`;
       return element("span", { class: "swatch" }, dot, name);
     });
     this.box = element("details", { class: "map" }, element("summary", {}, "Map of two parameters"),
       element("div", { class: "controls" }, element("label", {}, "along ", this.x), element("label", {}, "up ", this.y)), this.canvas, element("p", { class: "legend" }, ...legend), this.note);
     this.box.addEventListener("toggle", () => this.draw());
+    document.addEventListener("theme", () => this.draw());
   }
 
   at(i, j) {
@@ -79,7 +80,7 @@ export class ExploreMap {
           const cells = left.splice(0, AT_ONCE), verdicts = await judge(cells.map(([i, j]) => this.at(i, j)));
           if (run !== this.run) return;
           cells.forEach(([i, j], k) => {
-            context.fillStyle = verdicts[k] < 0 ? palette.card : SHADES[verdicts[k]][1]();
+            context.fillStyle = verdicts[k] < 0 ? palette.card : palette[SHADES[verdicts[k]][1]];
             context.fillRect(i, CELLS - j - stride, stride, stride);
           });
         }

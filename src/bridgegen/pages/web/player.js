@@ -263,7 +263,7 @@ export class Player {
   // Keys act while the focus is in the player, or nowhere and the player is in sight.
   key(event) {
     const focus = document.activeElement, inside = $("player").contains(focus);
-    if (event.ctrlKey || event.metaKey || event.altKey || focus?.tagName === "SELECT") return;
+    if (event.ctrlKey || event.metaKey || event.altKey || focus?.tagName === "SELECT" || (focus?.type === "range" && focus !== $("scrub"))) return;
     if (!inside && !(focus === document.body && this.inSight())) return;
     if (event.key === " " && inside && focus.tagName === "BUTTON") return; // the button's own
     const speed = $("speed");

@@ -8,3 +8,4 @@ import { Player } from "./player.js";
 const trial = new Player(hook);
 trial.show(data.kept[0]);
 new Explorer(trial).show(data.kept[0]);
+document.addEventListener("theme", () => trial.redraw());
