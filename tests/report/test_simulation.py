@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import shlex
 import shutil
 import subprocess
@@ -226,6 +227,30 @@ def test_a_page_says_of_what_else_the_search_s_verdict_is_made(tmp_path):
     assert judged(**own, out=tmp_path / "harm") == {"alone": True, "gated": True, "criteria": True}
     other = judged(algorithm="random", worse_than="fsm", out=tmp_path / "other")
     assert other == {"alone": False, "gated": True, "criteria": False}
+
+
+@pytest.mark.browser
+def test_an_implausible_encounter_is_said_to_be_left_out(browser, tmp_path):
+    options = {"ego": "route-follower", "algorithm": "random", "triage": "none"}
+    run = bg.run_search("cut-in", budget=8, keep=1, out=tmp_path / "run", **options)
+    path = run.folder / "report.html"
+    # Within the scenario's constraints no change of lanes is so fast.
+    free = r'\1\g<2>0.3\3"bounds":[],"x":'
+    own = r'(\{"name":"change_time",)("low":)2\.0(,[^\[]*?)"bounds":'
+    path.write_text(re.sub(own, free, path.read_text("utf-8")), "utf-8")
+    page = browser.new_page()
+    page.goto(path.as_uri())
+    page.wait_for_selector("#explore input")
+    page.evaluate(
+        """() => {
+        const slider = document.querySelector('#explore input[aria-label="change_time"]');
+        slider.value = slider.min; slider.dispatchEvent(new Event("input")); }"""
+    )
+    page.wait_for_selector(".tried:has-text('implausible: turn beyond the tyres')")
+    said = page.inner_text(".tried")
+    assert "; the search leaves it out. " in said
+    assert "FAILS" not in said
+    page.close()
 
 
 @pytest.mark.browser

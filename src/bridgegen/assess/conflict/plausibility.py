@@ -186,10 +186,10 @@ def towed_by_of(rollout: Rollout) -> Int:
 
 def limits_of(rollout: Rollout) -> Float:
     """Return the `LIMITS` of each participant, ``(E, 6)``."""
-    if len(rollout.kinds):
-        return LIMITS[rollout.kinds]
-    limits = LIMITS[np.full(rollout.shape[1], OTHER)]
-    limits[:, -1] = 0.0  # they are no props
+    is_known = len(rollout.kinds) > 0
+    limits: Float = LIMITS[rollout.kinds if is_known else np.full(rollout.shape[1], OTHER)]
+    if not is_known:
+        limits[:, -1] = 0.0  # they are no props
     return limits
 
 
