@@ -272,7 +272,7 @@ export class Explorer {
 
   // All values of what is shown, derived ones among them.
   async shown() {
-    return this.row ?? { ...completed(await simulator(), this.values), ...this.values };
+    return this.row ?? { ...(await simulator()).complete(this.values), ...this.values };
   }
 
   async copy(button) {
