@@ -19,10 +19,10 @@ from bridgegen.scenario.language.reader import names
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="publish this machine's digests")
-    parser.add_argument("--pages", action="store_true", help="compare what reports simulate")
+    parser.add_argument("--pages", nargs="*", help="compare what reports simulate, of some")
     options = parser.parse_args()
-    if options.pages:
-        bits_pages.main()
+    if options.pages is not None:
+        bits_pages.main(options.pages)
         return
     write = options.write
     known = {} if write else conformance.published()["rows"]

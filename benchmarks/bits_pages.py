@@ -1,7 +1,8 @@
 """Whether a report re-simulates each row of its run with the bits that the run has.
 
 Of each row: its parameter values, number of instants, status, motion, least distance, speed then,
-conflict, type, responsible, rule, partner, severity and delta-v. What ``simulator.js`` gives in
+conflict, type, responsible, rule, partner, severity and delta-v, and all other metrics that the
+page computes; and whether its traffic is plausible. What ``simulator.js`` gives in
 Node and in Chromium is compared with what ``run.sqlite`` stores; motion, with Python's rollout.
 """
 
@@ -13,11 +14,15 @@ import subprocess
 import tempfile
 import zlib
 from base64 import b64decode, b64encode
+from collections.abc import Sequence
 from importlib.resources import files
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
 import bridgegen as bg
+from bridgegen.assess.conflict._measure_kernels import MEASURED
+from bridgegen.assess.metrics import TABLE_I
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.results.store import Store
@@ -44,9 +49,10 @@ async function bits({ simulation, kernels, tables, rows, any, entities }) {
     found.push(row);
     if (status !== 0) continue;
     simulator.judge(steps, status);
-    const k = Number(simulator.array("verdict", "instants")[1]), best = simulator.decisive(any);
-    row.d_min = simulator.array("verdict", "least")[0] + 0;
-    row.v_d = k < 0 ? 0 : Math.abs(simulator.array("record", "v")[k]);
+    const best = simulator.decisive(any), exact = (x) => (Number.isFinite(x) ? x + 0 : String(x));
+    row.implausible = simulator.implausible(steps);
+    const metrics = simulator.metrics(steps);
+    row.metrics = Object.fromEntries(metrics.map(([name, , x]) => [name, exact(x)]));
     if (!best) continue;
     const { e, kind, read } = best;
     const word = (list, column) => simulation.judged[list][read(e, column)];
@@ -70,8 +76,8 @@ CONFLICT = ("conflict", "conflict_type", "responsible", "rule", "partner")
 OPTIONS = ("--no-sandbox", "--disable-background-networking", "--disable-component-update")
 
 
-def main() -> None:
-    """Print how many rows of each run are equal.
+def main(scenarios: Sequence[str] = ()) -> None:
+    """Print how many rows of each run are equal, of all scenarios or of some.
 
     Raises:
         SystemExit: not all are.
@@ -89,7 +95,7 @@ def main() -> None:
         page.goto("https://localhost/")
         page.add_script_tag(content=script)
         (Path(folder) / "host.cjs").write_text(script + NODE)
-        for scenario in names():
+        for scenario in scenarios or names():
             for driver in DRIVERS:
                 given, want = run_of(scenario, driver, Path(folder) / f"{scenario} {driver}")
                 (Path(folder) / "given.json").write_text(json.dumps(given))
@@ -113,6 +119,11 @@ def main() -> None:
         raise SystemExit(1)
 
 
+def as_json(value: float) -> float | str:
+    """Return a number as JSON has it; NaN equals NaN."""
+    return value if isfinite(value) else {inf: "Infinity", -inf: "-Infinity"}.get(value, "NaN")
+
+
 def unequal(row: dict[str, Any], want: dict[str, Any]) -> dict[str, Any]:
     """Return what differs between two rows: pairs of what is found, and what is wanted."""
     return {
@@ -124,7 +135,9 @@ def unequal(row: dict[str, Any], want: dict[str, Any]) -> dict[str, Any]:
 
 def run_of(scenario: str, driver: str, folder: Path) -> tuple[dict[str, Any], list[Any]]:
     """Search a scenario; return what its report simulates, and what should come of each row."""
-    bg.run_search(scenario, ego=driver, budget=BUDGET, keep=1, triage="none", out=folder)
+    beyond = [name for name in MEASURED if name not in TABLE_I]
+    options = {"budget": BUDGET, "keep": 1, "triage": "none", "metrics": beyond}
+    bg.run_search(scenario, ego=driver, out=folder, **options)
     page = (folder / "report.html").read_text("utf-8")
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
     assert found is not None
@@ -153,7 +166,9 @@ def run_of(scenario: str, driver: str, folder: Path) -> tuple[dict[str, Any], li
         if stored.status[i]:
             continue
         measured = dict(zip(metrics, stored.metrics[i].tolist(), strict=True))
-        want[-1] |= {name: measured[name] for name in ("d_min", "v_d")}
+        shown = [name for name, *_ in simulation["judged"]["metrics"]]
+        want[-1]["metrics"] = {name: as_json(measured[name]) for name in shown}
+        want[-1]["implausible"] = stored.findings.implausible[i]
         words = {name: getattr(stored.findings, name)[i] for name in CONFLICT}
         if words["conflict"] not in ("", "collision course"):
             want[-1] |= words | {name: measured[name] for name in ("severity", "delta_v")}

@@ -27,13 +27,14 @@ from numba.core import codegen
 from numba.core.runtime import rtsys
 
 from bridgegen.assess.conflict._judge_kernels import judge_row
+from bridgegen.assess.conflict._measure_kernels import implausible_row, measure_row
 from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compilation.library import KernelLibrary
 from bridgegen.base.compiled import compile_for_kernels, row_type
 from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.pages.simulation_payload import facts_of, verdict_of
+from bridgegen.pages.simulation_payload import facts_of, measuring_of, verdict_of
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded import portable
 from bridgegen.simulation.embedded._rollout_kernels import simulate_row
@@ -41,7 +42,7 @@ from bridgegen.simulation.embedded.addresses import CALLED
 
 TRIPLE = "wasm32-unknown-unknown"
 FEATURES = "+bulk-memory,+bulk-memory-opt,+nontrapping-fptoint,+sign-ext,+mutable-globals"
-EXPORTS = ("simulate", "judge", "function", "address")
+EXPORTS = ("simulate", "judge", "implausible", "measure", "function", "address")
 
 RUNTIME = """
 @heap = global i32 0
@@ -99,6 +100,36 @@ define void @judge(
     ptr %facts, ptr %record, ptr %verdict
   )
   ret void
+}}
+
+define i32 @implausible(
+  i32 %steps, ptr %facts, ptr %measuring, ptr %record, ptr %verdict, i32 %heap
+) {{
+  %answer = alloca i8
+  %error = alloca ptr
+  store i32 %heap, ptr @heap
+  %n = sext i32 %steps to i64
+  call i32 @"{implausible}"(
+    ptr %answer, ptr %error, i64 %n, ptr %facts, ptr %measuring, ptr %record, ptr %verdict
+  )
+  %code = load i8, ptr %answer
+  %value = zext i8 %code to i32
+  ret i32 %value
+}}
+
+define double @measure(
+  i32 %which, i32 %steps, ptr %facts, ptr %measuring, ptr %record, ptr %verdict, i32 %heap
+) {{
+  %answer = alloca double
+  %error = alloca ptr
+  store i32 %heap, ptr @heap
+  %w = sext i32 %which to i64
+  %n = sext i32 %steps to i64
+  call i32 @"{measure}"(
+    ptr %answer, ptr %error, i64 %w, i64 %n, ptr %facts, ptr %measuring, ptr %record, ptr %verdict
+  )
+  %value = load double, ptr %answer
+  ret double %value
 }}
 
 define double @function(i32 %which, double %x, double %y) {{
@@ -176,11 +207,15 @@ def linked() -> str:
     rows = batch.kinds()
     rollout = batch.run()
     facts = facts_of(rollout, 0, np.zeros((0, CORRIDOR)))
-    judged = [row_type(bundle, 0) for bundle in (facts, verdict_of(*rollout.shape[1:]))]
+    bundles = (facts, measuring_of(rollout, 0), verdict_of(*rollout.shape[1:]))
+    facts, measuring, verdict = (row_type(bundle, 0) for bundle in bundles)
+    measured = (types.int64, facts, measuring, rows[3], verdict)
     numbers = (types.int64, types.int64, types.int64, types.float64)
     entries = {
         "simulate": symbol_of(simulate_row, rows),
-        "judge": symbol_of(judge_row, (*numbers, judged[0], rows[3], judged[1])),
+        "judge": symbol_of(judge_row, (*numbers, facts, rows[3], verdict)),
+        "implausible": symbol_of(implausible_row, measured),
+        "measure": symbol_of(measure_row, (types.int64, *measured)),
         "function": symbol_of(elementary.value, (types.int64, types.float64, types.float64)),
     }
     called = [symbol_of(kernel, (*first, *rows)) for kernel, first in CALLED.items()]

@@ -7,6 +7,12 @@ import numpy as np
 import pytest
 
 from bridgegen.assess.conflict._judge_kernels import judge_row
+from bridgegen.assess.conflict._measure_kernels import (
+    IOU,
+    MEASURED,
+    implausible_row,
+    measure_row,
+)
 from bridgegen.assess.conflict.analysis import (
     CONTACT,
     IS_SO,
@@ -16,13 +22,15 @@ from bridgegen.assess.conflict.analysis import (
     ConflictType,
     analyse,
 )
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.assess.metrics import evaluate
 from bridgegen.assess.metrics.distances import closest
 from bridgegen.base.compiled import bundled, bundled_row, kernel
 from bridgegen.drivers.kinds import BICYCLE, CAR
 from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.pages.simulation_payload import facts_of
+from bridgegen.pages.simulation_payload import facts_of, measuring_of
 from bridgegen.pages.simulation_payload import verdict_of as room_of
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded._memory_kernels import Record
@@ -32,6 +40,15 @@ from bridgegen.simulation.embedded._memory_kernels import Record
 def judge(n_steps, status, path, friction, facts, records, i, verdict):
     record = bundled_row(records, i)
     judge_row(n_steps, status, path, friction, bundled(facts), record, bundled(verdict))
+
+
+@kernel
+def measure(which, n_steps, facts, measuring, records, i, verdict):
+    record = bundled_row(records, i)
+    given = bundled(facts), bundled(measuring), record, bundled(verdict)
+    if which < 0:
+        return float(implausible_row(n_steps, *given))
+    return measure_row(which, n_steps, *given)
 
 
 def verdict_of(e, t):
@@ -63,10 +80,19 @@ def judged(rollout, row, records, corridor, path):
     return verdict
 
 
+def measured(rollout, row, records, verdict, names):
+    """Measure a row that is judged, and compare; returns the code of what is implausible."""
+    own = facts_of(rollout, row, np.zeros((0, CORRIDOR))), measuring_of(rollout, row)
+    given = int(rollout.n_steps[row]), *own, records, row, verdict
+    return measure(-1, *given), [measure(MEASURED.index(name), *given) for name in names]
+
+
 def agree(rollout, records, corridors, paths):
     """Judge each row, and compare."""
     found = analyse(rollout)
     least, nearest = closest(rollout)
+    names = MEASURED if rollout.detections.size else MEASURED[:IOU]
+    measures, codes = evaluate(rollout, names), plausibility(rollout).code
     for row in range(rollout.shape[0]):
         verdict = judged(rollout, row, records, corridors[row], int(paths[row]))
         pairs = {name: verdict.whole[:, column] for name, column in WHOLES.items()}
@@ -82,6 +108,10 @@ def agree(rollout, records, corridors, paths):
         touches = np.flatnonzero((verdict.distance == 0.0).any(axis=0))
         contact = touches[0] if touches.size and touches[0] < rollout.n_steps[row] else -1
         same(verdict.instants, np.array([contact, nearest[row]]), (row, "instants"))
+        if rollout.status[row] == 0:
+            code, values = measured(rollout, row, records, verdict, names)
+            assert code == codes[row], row
+            same(np.array(values) + 0.0, measures[row] + 0.0, (row, names))
     return found
 
 

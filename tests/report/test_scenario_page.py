@@ -20,6 +20,7 @@ from bridgegen.pages.scenario_page import show_scenario, story_lines
 from bridgegen.pages.sketch import HEIGHT, WIDTH, sketch
 from bridgegen.scenario.language.reader import load, names
 from bridgegen.scenario.language.starter import start_scenario
+from bridgegen.simulation.embedded import portable
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -302,8 +303,8 @@ def test_a_scenario_is_tried_on_its_page(browser, tmp_path):
     page.close()
 
 
-def test_a_page_that_cannot_simulate_says_why(tmp_path):
+def test_a_page_that_cannot_simulate_says_why(tmp_path, monkeypatch):
+    monkeypatch.setattr(portable, "MODULE", tmp_path / "kernels.wasm")
     text = show_scenario("stopped-after-curve", tmp_path / "page.html").read_text("utf-8")
-    assert "It is not simulated in this page: an entity starts on a road" in text
-    assert "<script" not in text
-    assert "script-src" not in text
+    assert "It is not simulated in this page: this installation has no kernels" in text
+    assert 'id="data"' not in text

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import shlex
 import shutil
 import subprocess
@@ -11,9 +12,11 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
+from bridgegen.assess.conflict._measure_kernels import MEASURED
 from bridgegen.assess.conflict.analysis import COURSE, analyse
 from bridgegen.assess.conflict.findings import KINDS
 from bridgegen.assess.conflict.harm import decisive
+from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages.simulation_payload import simulation_payload
@@ -28,7 +31,10 @@ import { readFileSync } from "node:fs";
 import { inflateSync } from "node:zlib";
 import { Simulator } from "./simulator.mjs";
 
-const { simulation, rows, driver } = JSON.parse(readFileSync("given.json", "utf8"));
+// Infinity is no number of JSON, so numbers are texts.
+const measured = (steps, status) => (status ? null : [simulator.implausible(steps),
+  Object.fromEntries(simulator.metrics(steps).map(([name, , value]) => [name, String(value)]))]);
+const { simulation, rows, driver, asked } = JSON.parse(readFileSync("given.json", "utf8"));
 const data = (text) => new Uint8Array(inflateSync(Buffer.from(text, "base64")));
 const kernels = new WebAssembly.Module(data(simulation.kernels));
 const simulator = new Simulator(kernels, simulation, data(simulation.data));
@@ -43,7 +49,8 @@ for (const values of rows) {
   simulator.judge(steps, status);
   const found = simulator.decisive(false);
   const conflict = found ? `${found.kind} with ${found.e}` : "";
-  console.log(`${steps} ${status} ${hash.digest("hex").slice(0, 16)} ${conflict}`);
+  if (asked) console.log(JSON.stringify(measured(steps, status)));
+  else console.log(`${steps} ${status} ${hash.digest("hex").slice(0, 16)} ${conflict}`);
 }
 """
 
@@ -68,12 +75,12 @@ def here(pipeline, X):
         yield f"{steps} {rollout.status[i]} {digest.hexdigest()[:16]} {conflict}"
 
 
-def elsewhere(pipeline, X, folder, driver=None):
+def elsewhere(pipeline, X, folder, driver=None, **more):
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed")
     rows = [pipeline.space.values(x) for x in X]
-    given = {"simulation": simulation_payload(pipeline), "rows": rows, "driver": driver}
+    given = {"simulation": simulation_payload(pipeline), "rows": rows, "driver": driver, **more}
     (folder / "given.json").write_text(json.dumps(given))
     script = files("bridgegen.pages") / "web" / "simulator.js"
     (folder / "simulator.mjs").write_text(script.read_text("utf-8"))
@@ -105,6 +112,52 @@ def test_a_page_gets_the_same_bits(scenario, driver, tmp_path):
     X = rows_of(pipeline, 24, 7)
     want = list(here(pipeline, X))  # the ways that these rows need are planned now
     assert elsewhere(pipeline, X, tmp_path) == want
+
+
+METRICS = (*MEASURED[:-3], "severity", "delta_v")
+"""What every page may compute; it names the metrics that it does not."""
+
+OF_PERCEPTION = MEASURED[-3:]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "driver", "more"),
+    [
+        ("crossroads-s4", "route-follower", ()),
+        ("crossroads-s2", "reference", OF_PERCEPTION),
+        ("cut-in", "un-r157", ()),
+        ("emergency-vehicle-on-red", "careful", ()),
+        ("pedestrian-behind-parked", "reference", OF_PERCEPTION),
+        ("bus-pulls-out", "route-follower", ()),
+    ],
+)
+def test_a_page_measures_with_the_same_bits(scenario, driver, more, tmp_path):
+    logical, asked = load(scenario), METRICS[:-2] + tuple(more)
+    pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego=driver, metrics=asked))
+    judged = simulation_payload(pipeline)["judged"]
+    assert judged["unmeasured"] == ["harm", "harm_any", "course_ttc", "course_braking"]
+    X = rows_of(pipeline, 24, 11)
+    rollout = pipeline.runner.run(X)
+    values, labels = pipeline.measure(rollout), plausibility(rollout).labels
+    found = [json.loads(line) for line in elsewhere(pipeline, X, tmp_path, asked=True)]
+    for one, status, row, label in zip(found, rollout.status, values.tolist(), labels, strict=True):
+        if status:
+            continue
+        want = dict(zip(pipeline.metrics, row, strict=True))
+        assert one[0] == label
+        assert set(one[1]) == {*METRICS, *more}
+        assert {n: float(v) for n, v in one[1].items()} == {n: want[n] for n in one[1]}
+
+
+def test_a_page_knows_what_is_implausible(tmp_path):
+    """A car that cuts in faster than tyres let it; no row of the catalogue's is implausible."""
+    pipeline = made("cut-in", "route-follower")
+    X = rows_of(pipeline, 24, 3)
+    X[:, pipeline.space.names.index("change_time")] = np.linspace(0.3, 3.0, len(X))
+    labels = plausibility(pipeline.runner.run(X)).labels
+    assert len({*labels}) > 1
+    found = [json.loads(line) for line in elsewhere(pipeline, X, tmp_path, asked=True)]
+    assert [one[0] for one in found] == labels
 
 
 def test_of_two_conflicts_the_one_decides_that_decides_in_a_search(tmp_path):
@@ -177,6 +230,30 @@ def test_a_page_says_of_what_else_the_search_s_verdict_is_made(tmp_path):
 
 
 @pytest.mark.browser
+def test_an_implausible_encounter_is_said_to_be_left_out(browser, tmp_path):
+    options = {"ego": "route-follower", "algorithm": "random", "triage": "none"}
+    run = bg.run_search("cut-in", budget=8, keep=1, out=tmp_path / "run", **options)
+    path = run.folder / "report.html"
+    # Within the scenario's constraints no change of lanes is so fast.
+    free = r'\1\g<2>0.3\3"bounds":[],"x":'
+    own = r'(\{"name":"change_time",)("low":)2\.0(,[^\[]*?)"bounds":'
+    path.write_text(re.sub(own, free, path.read_text("utf-8")), "utf-8")
+    page = browser.new_page()
+    page.goto(path.as_uri())
+    page.wait_for_selector("#explore input")
+    page.evaluate(
+        """() => {
+        const slider = document.querySelector('#explore input[aria-label="change_time"]');
+        slider.value = slider.min; slider.dispatchEvent(new Event("input")); }"""
+    )
+    page.wait_for_selector(".tried:has-text('implausible: turn beyond the tyres')")
+    said = page.inner_text(".tried")
+    assert "; the search leaves it out. " in said
+    assert "FAILS" not in said
+    page.close()
+
+
+@pytest.mark.browser
 def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(browser, cli, tmp_path):
     run = bg.run_search("crossroads-s4", budget=60, keep=2, triage="none", out=tmp_path / "run")
     page = browser.new_page(viewport={"width": 1280, "height": 900})
@@ -197,7 +274,9 @@ def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(brows
     assert conflict["rule"] in said
     assert f"responsible: {conflict['responsible']}" in said
     assert f"v_d {metrics['metrics']['v_d']['value']:.4g}" in page.inner_text("#explore")
-    assert "plausible" in page.inner_text("#explore")
+    assert "Not computed here: harm" in page.inner_text("#explore")
+    page.click("#explore details:not(.map) summary")
+    assert f"ttc\n{metrics['metrics']['ttc']['value']:.4g}" in page.inner_text("#explore")
     with page.expect_download() as saved:
         page.click("text=Save .xosc")
     metrics_of = {k: v["value"] for k, v in metrics["metrics"].items()}
@@ -219,7 +298,7 @@ def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(brows
     assert json.loads(out)["metrics"]["v_d"] == metrics_of["v_d"]
     page.select_option("#explore select[aria-label=Driver]", "un-r157")
     page.wait_for_selector(".tried:has-text('un-r157')")
-    page.click("#explore summary")
+    page.click("#explore .map summary")
     page.wait_for_selector(".map p:has-text('3,600 encounters')")
     assert page.workers
     assert not errors
@@ -230,7 +309,7 @@ def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(brows
     page.reload()
     page.select_option("#explore select[aria-label=Driver]", "un-r157")
     page.wait_for_selector(".tried:has-text('un-r157')")
-    page.click("#explore summary")
+    page.click("#explore .map summary")
     page.wait_for_selector(".map p:has-text('3,600 encounters')")
     assert not page.workers
     assert page.evaluate(drawn) == with_workers

@@ -50,7 +50,7 @@ def test_a_served_page_simulates(opened):
         slider.value = slider.max; slider.dispatchEvent(new Event("input")); }"""
     )
     page.wait_for_selector(".tried:has-text('route-follower')")
-    page.click("#explore summary")
+    page.click("#explore .map summary")
     page.wait_for_selector(".map p:has-text('3,600 encounters')")
     assert page.workers
     assert page.complaints == []

@@ -1,22 +1,36 @@
 """What a report simulates scenarios with: kernels, a storyboard's tables, the parameters' rules."""
 
+from dataclasses import astuple
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from bridgegen.assess.conflict import _codes as codes
-from bridgegen.assess.conflict import harm
+from bridgegen.assess.conflict import harm, quantities
 from bridgegen.assess.conflict._judge_kernels import Facts, Verdict
 from bridgegen.assess.conflict._limits import HORIZON, SERIOUS_DECELERATION
+from bridgegen.assess.conflict._measure_kernels import IOU, MEASURED, Measuring
 from bridgegen.assess.conflict._violation_kernels import LEAVINGS, PASSINGS
 from bridgegen.assess.conflict.findings import KINDS
+from bridgegen.assess.conflict.plausibility import (
+    AFTER,
+    Implausible,
+    limits_of,
+    towed_by_of,
+    window_of,
+)
 from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
+from bridgegen.assess.criteria import OF_BASELINE
+from bridgegen.assess.metrics import braking, distances, impact, perception, road, times
+from bridgegen.assess.metrics.metric import in_steps
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
+from bridgegen.base.physics import GRIP, HARD_BRAKING
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages.packed import deflated
 from bridgegen.pages.storyboard_payload import storyboard_payload
+from bridgegen.scenario.language.criteria import PREFIX
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.simulation.adversary import AdversarySource
 from bridgegen.simulation.embedded import portable
@@ -36,6 +50,9 @@ COLUMNS = (
     *("TTC", "NEEDED", "NEARNESS"),
 )
 """Columns of a verdict's numbers that the page reads."""
+
+OF_CONFLICT = {"severity": ["severity", 1], "delta_v": ["changes", 2]}
+"""Metrics that a verdict has of each conflict: its field, and how many numbers that has of each."""
 
 HARM = {
     "course": harm.COURSE,
@@ -67,9 +84,9 @@ def simulation_payload(pipeline: Pipeline, commands: tuple[str, str] = ("", ""))
         facts = facts_of(rollout, 0, roads.corridors([0])[0])
         if facts.own_bodies != 1:
             raise InputError("the ego has a trailer")
-        room = verdict_of(*rollout.shape[1:])
+        room, measuring = verdict_of(*rollout.shape[1:]), measuring_of(rollout, 0)
         program = runner.embedded.program
-        found = portable.tables(program, roads, facts=facts, verdict=room)
+        found = portable.tables(program, roads, facts=facts, measuring=measuring, verdict=room)
         if (size := len(found["data"])) > MOST:
             kilobytes = f"{size // 1000} kB of a page, {MOST // 1000} kB at most"
             raise InputError(f"its road network takes {kilobytes}")
@@ -85,12 +102,34 @@ def simulation_payload(pipeline: Pipeline, commands: tuple[str, str] = ("", ""))
             "types": [kind.label for kind in ConflictType],
             "responsible": [who.label for who in Responsible],
             "rules": [rule.label for rule in Rule],
+            **_measured(pipeline),
             **_verdict(pipeline),
         },
         "commands": list(commands),
         "file": storyboard_payload(pipeline, X[:FILES]),
         "unused": [name for name in space.names if name in runner.source.unused_names],
     }
+
+
+def _measured(pipeline: Pipeline) -> dict[str, Any]:
+    """Return the metrics of the search by name, unit and where they are found, and what is not.
+
+    "implausible": reasons by code; "metrics": their numbers in ``MEASURED``, and whether they need
+    detections, or see ``OF_CONFLICT``.
+    """
+    metrics, unmeasured = [], []
+    for name in pipeline.metrics:
+        if name.startswith((PREFIX, OF_BASELINE)):
+            continue
+        if name in MEASURED:
+            at = MEASURED.index(name)
+            metrics.append([name, quantities.get(name).unit, at, at >= IOU])
+        elif name in OF_CONFLICT:
+            metrics.append([name, quantities.get(name).unit, OF_CONFLICT[name], False])
+        else:
+            unmeasured.append(name)
+    reasons = [reason.label for reason in Implausible]
+    return {"metrics": metrics, "unmeasured": unmeasured, "implausible": reasons}
 
 
 def _verdict(pipeline: Pipeline) -> dict[str, bool]:
@@ -134,7 +173,35 @@ def facts_of(rollout: Rollout, row: int, corridor: Float) -> Facts:
         stop_lines=rollout.stop_lines[row] if stops else np.zeros((0, 3)),
         corridor=corridor,
         time_step=rollout.time_step,
+        after=round(AFTER / rollout.time_step),
         own_bodies=sum(rollout.is_ego_s(entity) for entity in range(e)),
+    )
+
+
+def measuring_of(rollout: Rollout, row: int) -> Measuring:
+    """Return what measuring a row needs besides; see `facts_of`."""
+    own, dt = np.flatnonzero(rollout.stop_entities == 0), rollout.time_step
+    classes = perception.CLASS_OF_KIND[rollout.kinds]
+    return Measuring(
+        limits=limits_of(rollout),
+        towed_by=np.ascontiguousarray(towed_by_of(rollout), dtype=np.int64),
+        window=window_of(rollout),
+        merged=in_steps("MERGED", impact.MERGED, dt),
+        abrupt=in_steps("ABRUPT", braking.ABRUPT, dt),
+        longest=in_steps("LONGEST", times.LONGEST, dt),
+        hard=HARD_BRAKING,
+        most=braking.MOST,
+        grip=GRIP,
+        target=times.TARGET,
+        beside=road.ASIDE,
+        safe=np.array(astuple(distances.Parameters())),
+        lines=rollout.stop_lines[row, own] if own.size else np.zeros((0, 3)),
+        line_lights=np.ascontiguousarray(rollout.stop_lights[own], dtype=np.int64),
+        classes=classes,
+        reach=perception.RANGES[classes],
+        class_of_kind=perception.CLASS_OF_KIND,
+        ranges=perception.RANGES,
+        thresholds=perception.THRESHOLDS,
     )
 
 
@@ -144,8 +211,11 @@ def verdict_of(e: int, t: int) -> Verdict:
     shapes |= dict.fromkeys(("potential", "severity", "aside", "breach", "at_fault"), (e,))
     shapes |= {"whole": (e, codes.INTEGERS), "real": (e, codes.FLOATS), "changes": (e, 2)}
     shapes |= {"is_judged": (1,), "least": (1,), "over": (1,), "instants": (2,), "gaps": (2,)}
+    shapes |= {"until": (1,)}
     shapes |= {"apart": (2, t), "leave": (LEAVINGS,), "passed": (PASSINGS,)}
-    kinds: dict[str, Any] = dict.fromkeys(("whole", "instants", "leave", "passed"), np.int64)
+    kinds: dict[str, Any] = dict.fromkeys(
+        ("whole", "instants", "until", "leave", "passed"), np.int64
+    )
     kinds |= dict.fromkeys(("is_judged", "at_fault", "reverses"), np.bool_)
     return Verdict(**{n: np.zeros(shape, kinds.get(n, float)) for n, shape in shapes.items()})
 

@@ -9,7 +9,7 @@ It takes bundles and allocates nothing, so that it also runs where there is no P
 import math
 from typing import NamedTuple
 
-from bridgegen.assess.conflict._codes import TTC
+from bridgegen.assess.conflict._codes import INSTANT, KIND, TTC
 from bridgegen.assess.conflict._conflict_kernels import (
     analyse_row,
     fails,
@@ -17,6 +17,7 @@ from bridgegen.assess.conflict._conflict_kernels import (
     name_zones,
     weigh,
 )
+from bridgegen.assess.conflict._plausibility_kernels import last_conflict
 from bridgegen.assess.conflict._violation_kernels import violate
 from bridgegen.assess.metrics._kernels import closest_of, place_row, turn_round
 from bridgegen.base.arrays import Bool, Float, Int
@@ -38,6 +39,7 @@ class Facts(NamedTuple):
         stop_lines: ``(L, 3)``.
         corridor: ``(S, 8)`` along the ego's first path; without rows where it is unknown.
         time_step: [s].
+        after: instants of ``plausibility.AFTER``.
         own_bodies: how many bodies the ego has: 1, and 1 for each trailer.
     """
 
@@ -51,6 +53,7 @@ class Facts(NamedTuple):
     stop_lines: Float
     corridor: Float
     time_step: float
+    after: int
     own_bodies: int
 
 
@@ -68,6 +71,7 @@ class Verdict(NamedTuple):
         distance: ``(E, T)`` [m], from the ego's body; +inf of its own and where one is absent.
         least: ``(1,)`` [m], the least of them; +inf without others.
         instants: ``(2,)`` of the ego's first contact, and that of ``least``; -1 without one.
+        until: ``(1,)``, see ``_plausibility_kernels.last_conflict``.
         x, y, cosine, sine, v, a, gone: ``(E, T)`` room; see `Motion` and `Scene`.
         reverses: ``(E, T)`` likewise.
         apart: ``(2, T)`` likewise,
@@ -89,6 +93,7 @@ class Verdict(NamedTuple):
     distance: Float
     least: Float
     instants: Int
+    until: Int
     x: Float
     y: Float
     cosine: Float
@@ -135,6 +140,7 @@ def judge_row(n_steps, status, path, friction, facts, record, verdict):
     verdict.aside[:] = 0.0
     verdict.breach[:] = 0.0
     verdict.at_fault[:] = False
+    verdict.until[0] = distance.shape[1]
     if status != 0:
         return
     analyse_row(
@@ -145,6 +151,8 @@ def judge_row(n_steps, status, path, friction, facts, record, verdict):
     )  # fmt: skip
     name_zones(verdict.reverses, whole)
     weigh(facts.kinds, verdict.v, whole, real, verdict.potential, verdict.severity, verdict.changes)
+    kind, instant = whole[:, KIND], whole[:, INSTANT]
+    verdict.until[0] = last_conflict(kind, instant, facts.after, distance.shape[1])
     if path == 0:
         violate(
             facts.corridor, facts.half, facts.kinds, record.x, record.y, verdict.x, verdict.y,

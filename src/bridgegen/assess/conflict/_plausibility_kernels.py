@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from bridgegen.assess.conflict._codes import COURSE, NEAR_MISS
 from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
@@ -46,6 +47,34 @@ def overlap_depth(box_a, box_b, dx, dy, cos_a, sin_a, cos_b, sin_b):
         lb + c * la + s * wa - abs(dx * cos_b + dy * sin_b),
         wb + s * la + c * wa - abs(dy * cos_b - dx * sin_b),
     )
+
+
+@kernel
+def last_conflict(kind, instant, after, n):
+    """Return the instant up to which motion belongs to a row's conflicts; n if there are none.
+
+    Near misses and contacts count alike; collision courses only where there is neither.
+
+    Args:
+        kind: ``(E,)`` of the conflicts, without violations.
+        instant: ``(E,)`` likewise.
+        after: instants that still belong to one.
+        n: of instants.
+    """
+    worst, last = COURSE, -1
+    for e in range(len(kind)):
+        if min(kind[e], NEAR_MISS) > worst:
+            worst, last = NEAR_MISS, -1
+        if min(kind[e], NEAR_MISS) == worst:
+            last = max(last, instant[e] + after)
+    return n if last < 0 else last
+
+
+@kernel
+def last_conflicts(kind, instant, after, n, last):
+    """Fill the last, ``(N,)``."""
+    for i in range(len(last)):
+        last[i] = last_conflict(kind[i], instant[i], after, n)
 
 
 @kernel

@@ -7,7 +7,7 @@ from math import inf, isfinite
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.assess.conflict.analysis import COURSE, NEAR_MISS, encounters
+from bridgegen.assess.conflict.analysis import encounters
 from bridgegen.assess.metrics.metric import distance, recorded, steps
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
@@ -165,13 +165,32 @@ class Plausibility:
 
 def _last_conflict(rollout: Rollout) -> Int:
     """Return the instant up to which each row's motion belongs to its conflicts, ``(N,)``."""
-    found = encounters(rollout)
-    # Near misses and contacts count alike; collision courses only where there is neither.
-    worst = np.where(found.kind >= NEAR_MISS, NEAR_MISS, found.kind)
-    counts = (worst == worst.max(axis=1, keepdims=True)) & (worst >= COURSE)
+    from bridgegen.assess.conflict import _plausibility_kernels
+
+    found, last = encounters(rollout), np.empty(rollout.shape[0], np.int64)
+    kind, instant = (np.ascontiguousarray(a, np.int64) for a in (found.kind, found.instant))
     after = round(AFTER / rollout.time_step)
-    last: Int = np.where(counts, found.instant + after, -1).max(axis=1)
-    return np.where(last < 0, rollout.shape[2], last)
+    _plausibility_kernels.last_conflicts(kind, instant, after, rollout.shape[2], last)
+    return last
+
+
+def window_of(rollout: Rollout) -> int:
+    """Return `WINDOW` in time steps."""
+    return max(1, round(WINDOW / rollout.time_step))
+
+
+def towed_by_of(rollout: Rollout) -> Int:
+    """Return who tows each participant, ``(E,)``; -1: no one."""
+    return rollout.towed_by if len(rollout.towed_by) else np.full(rollout.shape[1], -1, np.int64)
+
+
+def limits_of(rollout: Rollout) -> Float:
+    """Return the `LIMITS` of each participant, ``(E, 6)``."""
+    is_known = len(rollout.kinds) > 0
+    limits: Float = LIMITS[rollout.kinds if is_known else np.full(rollout.shape[1], OTHER)]
+    if not is_known:
+        limits[:, -1] = 0.0  # they are no props
+    return limits
 
 
 def plausibility(rollout: Rollout) -> Plausibility:
@@ -192,22 +211,17 @@ def plausibility(rollout: Rollout) -> Plausibility:
     """
     from bridgegen.assess.conflict import _plausibility_kernels
 
-    n, e, _ = rollout.shape
+    n = rollout.shape[0]
     until = np.minimum(steps(rollout) - 1, _last_conflict(rollout))
-    kinds = rollout.kinds if len(rollout.kinds) else np.full(e, OTHER, np.int64)
-    limits = LIMITS[kinds]
-    if not len(rollout.kinds):
-        limits[:, _plausibility_kernels.IS_PROP] = 0.0
     cosine, sine = rollout.direction
     code = np.empty(n, np.int8)
     instant, entity, other = (np.empty(n, np.int64) for _ in range(3))
     value, limit = np.empty(n), np.empty(n)
     _plausibility_kernels.judge(
-        rollout.box, limits, *(recorded(rollout, name) for name in "xyhv"), cosine, sine,
-        distance(rollout), np.ascontiguousarray(rollout.present),
-        rollout.towed_by if len(rollout.towed_by) else np.full(e, -1, np.int64), until + 1,
-        np.asarray(rollout.status) != 0, rollout.time_step,
-        max(1, round(WINDOW / rollout.time_step)), code, instant, entity, other, value, limit,
+        rollout.box, limits_of(rollout), *(recorded(rollout, name) for name in "xyhv"), cosine,
+        sine, distance(rollout), np.ascontiguousarray(rollout.present),
+        towed_by_of(rollout), until + 1, np.asarray(rollout.status) != 0, rollout.time_step,
+        window_of(rollout), code, instant, entity, other, value, limit,
     )  # fmt: skip
     return Plausibility(
         rollout.names, rollout.time_step, code, instant, entity, other, value, limit

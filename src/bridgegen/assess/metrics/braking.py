@@ -19,7 +19,11 @@ from bridgegen.simulation.rollout import Rollout
 # --- a_change: the ego's most abrupt change of acceleration ---
 
 
-def a_change(rollout: Rollout, window: float = 0.5) -> Float:
+ABRUPT = 0.5
+"""Time within which changes of acceleration count [s]."""
+
+
+def a_change(rollout: Rollout, window: float = ABRUPT) -> Float:
     """Return the ego's largest change of longitudinal acceleration within a window.
 
     Args:

@@ -56,7 +56,11 @@ def at_contact(rollout: Rollout, field: str) -> Float:
 # --- n_collision: number of the ego's collisions ---
 
 
-def n_collision(rollout: Rollout, merge_within: float = 5.0) -> Float:
+MERGED = 5.0
+"""Time after a contact within which another with the same actor is part of it [s]."""
+
+
+def n_collision(rollout: Rollout, merge_within: float = MERGED) -> Float:
     """Return the number of contacts between the ego's oriented box and another's.
 
     Args:

@@ -72,15 +72,9 @@ const harmsAny = data.summary.harm === "harm_any";
 
 // What the search would also look at, and the page does not compute.
 function limits() {
-  const { alone, gated, criteria } = given.judged, beside = criteria && alone ? "pass criteria and " : "";
+  const { alone, criteria, unmeasured } = given.judged, left = [...(criteria && alone ? ["pass criteria"] : []), ...unmeasured];
   const rule = alone ? "" : `Conflicts only, none of which is called a failure here: in this run critical means ${data.summary.critical_rule}, which the page does not compute. `;
-  return `${rule}Not computed here: ${beside}further metrics${gated ? ", and whether the traffic is plausible (the search leaves implausible rows out)" : ""}.`;
-}
-
-// The metrics that follow from the motion with the bits of the search's.
-function figuresOf({ closest, distance, v }) {
-  if (closest === null) return "";
-  return `d_min ${quantity(distance[closest], "m")}, v_d ${quantity(Math.abs(v[0][closest]), "m/s")}`;
+  return `${rule}${left.length ? `Not computed here: ${left.join(", ")}.` : ""}`;
 }
 
 function conflictOf(made, simulator) {
@@ -164,7 +158,9 @@ export class Explorer {
     this.sliders = new Map();
     const lines = given.space.filter(({ searched, name }) => searched && !given.unused.includes(name)).map((part) => this.slider(part));
     this.said = element("p", { class: "tried", role: "status" }, "Try other values: move a slider.");
-    this.figures = element("p", { class: "muted small" });
+    this.closest = element("summary", {});
+    this.metrics = element("div", { class: "details" });
+    this.figures = element("details", { class: "small", hidden: true }, this.closest, this.metrics);
     const button = (text, act, title) => {
       const made = element("button", { type: "button", class: "quiet", title }, text);
       made.addEventListener("click", act);
@@ -237,9 +233,10 @@ export class Explorer {
       for (const name of this.sliders.keys()) this.write(name, row[name], name === moved && row[name] === Number(this.sliders.get(name).range.value));
       const { made, status } = playbackOf(this.base, kernels, row);
       this.row = row;
+      this.figures.hidden = status !== 0;
       if (status < 0) this.said.textContent = "Not simulated here: it needs a way that this page does not hold.";
       else if (status > 0) this.said.textContent = "These values make no scenario.";
-      else this.tell(made);
+      else this.tell(made, kernels);
       if (!(moved && [this.map?.x.value, this.map?.y.value].includes(moved))) this.map?.draw();
     } finally {
       this.busy = false;
@@ -247,26 +244,35 @@ export class Explorer {
     if (values !== this.values) await this.set(this.values, moved);
   }
 
-  tell(made) {
+  // Of the row that the kernels judged last.
+  tell(made, kernels) {
     const seconds = (k) => `${(k * made.time_step).toFixed(2)}\u00a0s`, found = made.conflict;
-    const fails = Boolean(found?.counts && given.judged.alone);
+    const { alone, gated } = given.judged, reason = kernels.implausible(made.n_steps);
+    const fails = Boolean(found?.counts && alone && !(gated && reason));
     this.said.classList.toggle("hit", fails);
     const least = made.closest === null ? "" : `; closest ${quantity(made.distance[made.closest], "m")} at ${seconds(made.closest)}`;
     let text = `${this.driver}: no conflict${least}.`;
     if (found) {
       const whom = found.partner ? ` with ${found.partner}` : "", severe = found.conflict === "contact" ? `, MAIS3+ ${shareText(found.severity)}` : "";
       const named = found.conflict === "contact" ? "collision" : found.conflict;
-      text = `${fails ? `${this.driver} FAILS: ` : ""}${named}${whom} at ${seconds(found.instant)}: ${[found.type, found.rule].filter(Boolean).join(", ")}; responsible: ${found.responsible}${severe}${fails || !given.judged.alone ? "" : ". Not counted"}.`;
+      text = `${fails ? `${this.driver} FAILS: ` : ""}${named}${whom} at ${seconds(found.instant)}: ${[found.type, found.rule].filter(Boolean).join(", ")}; responsible: ${found.responsible}${severe}${fails || !alone ? "" : ". Not counted"}.`;
       found.sentence = found.bare = text;
     }
-    this.said.textContent = text;
-    this.figures.textContent = figuresOf(made);
+    this.said.textContent = reason ? `implausible: ${reason}${gated ? "; the search leaves it out" : ""}. ${text}` : text;
+    this.measure(kernels.metrics(made.n_steps));
     this.player.swap(made);
+  }
+
+  // The metrics as a list, which is folded to the two that all runs have.
+  measure(metrics) {
+    const shown = metrics.map(([name, unit, value]) => [name, quantity(Number.isFinite(value) ? value : null, unit)]);
+    this.closest.textContent = shown.filter(([name]) => ["d_min", "v_d"].includes(name)).map((pair) => pair.join(" ")).join(", ");
+    this.metrics.replaceChildren(...shown.map(([name, text]) => element("div", { title: columns.get(name)?.description ?? "" }, element("span", { class: "name" }, name), element("b", {}, text))));
   }
 
   // All values of what is shown, derived ones among them.
   async shown() {
-    return this.row ?? { ...completed(await simulator(), this.values), ...this.values };
+    return this.row ?? { ...(await simulator()).complete(this.values), ...this.values };
   }
 
   async copy(button) {

@@ -6,7 +6,7 @@ import { quantity } from "./numbers.js";
 
 const CELLS = 60;
 const COARSE = [8, 4, 2, 1]; // strides of the passes: the whole is seen at once, then in full
-const AT_ONCE = 24; // cells, some milliseconds
+const CELLS_AT_ONCE = 24; // cells, some milliseconds
 
 /** Verdicts by what they are called, with the name of their colour. */
 const SHADES = [
@@ -77,7 +77,7 @@ export class ExploreMap {
       done += left.length;
       await Promise.all(judges.map(async (judge) => {
         while (left.length) {
-          const cells = left.splice(0, AT_ONCE), verdicts = await judge(cells.map(([i, j]) => this.at(i, j)));
+          const cells = left.splice(0, CELLS_AT_ONCE), verdicts = await judge(cells.map(([i, j]) => this.at(i, j)));
           if (run !== this.run) return;
           cells.forEach(([i, j], k) => {
             context.fillStyle = verdicts[k] < 0 ? palette.card : palette[SHADES[verdicts[k]][1]];

@@ -47,12 +47,13 @@ export class Simulator {
     this.at = {};
     this.initial = {};
     this.bundles = {};
-    for (const name of ["plan", "roads", "state", "record", "facts", "verdict"]) this.bundles[name] = this.put(tables[name], name);
+    for (const name of ["plan", "roads", "state", "record", "facts", "measuring", "verdict"]) this.bundles[name] = this.put(tables[name], name);
     this.records = new Map();
     this.keepRecord();
     this.driver = tables.driver;
     this.heap = this.top;
-    this.take(1 << 18);
+    const [count, length] = this.at.record.x.shape;
+    this.take((1 << 18) + 256 * count * length); // metrics of perception need most: some lists of all detections
   }
 
   /** A place for some bytes, which move nowhere. */
@@ -217,6 +218,21 @@ export class Simulator {
     this.exports.judge(steps, status, path, friction, facts, record, verdict);
   }
 
+  /** Why the traffic of the row judged last is implausible; "" if it is not. */
+  implausible(steps) {
+    const { facts, measuring, record, verdict } = this.bundles;
+    return this.tables.judged.implausible[this.exports.implausible(steps, facts, measuring, record, verdict, this.heap)];
+  }
+
+  /** The metrics of the row judged last, which did not fail: name, unit and value of each. */
+  metrics(steps) {
+    const { facts, measuring, record, verdict } = this.bundles, best = this.decisive(false), seen = this.at.record.detections.count > 0;
+    return this.tables.judged.metrics.filter(([, , , sees]) => seen || !sees).map(([name, unit, at]) => {
+      if (typeof at === "number") return [name, unit, this.exports.measure(at, steps, facts, measuring, record, verdict, this.heap)];
+      return [name, unit, best ? this.array("verdict", at[0])[best.e * at[1]] : 0]; // of the conflict that decides
+    });
+  }
+
   /**
    * The conflict of the row judged last that decides, as `harm.decisive` has it; null if there is none.
    * @param {boolean} any whether conflicts count for which the ego is not responsible
@@ -242,7 +258,7 @@ export class Simulator {
   }
 
   /**
-   * Numbers of verdicts on rows: −1 none, 0 no conflict, 1 one that does not count, 2 one that does, 3 a collision.
+   * Numbers of verdicts on rows: −1 none (the row fails, or the search leaves it out as implausible), 0 no conflict, 1 one that does not count, 2 one that does, 3 a collision.
    * @param {{driver: string, any: boolean, values: Record<string, number>, others: Record<string, number>[]}} asked rows are `values` with each of `others`
    */
   verdicts({ driver, any, values, others }) {
@@ -251,6 +267,7 @@ export class Simulator {
       const { steps, status } = this.run(this.complete({ ...values, ...other }));
       if (status !== 0) return -1;
       this.judge(steps, status);
+      if (this.tables.judged.gated && this.implausible(steps)) return -1;
       const found = this.decisive(any);
       return !found ? 0 : !found.counts ? 1 : found.kind === "contact" ? 3 : 2;
     });

@@ -43,7 +43,8 @@ def sources() -> str:
     found = hashlib.sha256()
     here = Path(__file__)
     entries = [here.with_name(name) for name in ("_rollout_kernels.py", "addresses.py")]
-    entries.append(PACKAGE / "assess" / "conflict" / "_judge_kernels.py")
+    judging = ("_judge_kernels.py", "_measure_kernels.py")
+    entries += [PACKAGE / "assess" / "conflict" / name for name in judging]
     for path in sorted(with_imported(entries)):
         tree = ast.parse(path.read_text("utf-8"))
         for node in ast.walk(tree):
