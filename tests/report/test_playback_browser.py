@@ -328,11 +328,15 @@ def test_it_fits_both_widths_in_both_schemes(show, fog, width, columns, scheme):
     assert len({round(x) for x, _ in panels}) == columns
     box = page.locator("#curves").bounding_box()
     assert all(0 < x < box["width"] and 0 < y < box["height"] for x, y in panels)
-    page.locator("#curves").scroll_into_view_if_needed()
-    box = page.locator("#curves").bounding_box()
     for panel in range(4):  # a click in any of them seeks
         k = 40 + 30 * panel
         x, y = page.evaluate(f"bridgegen.curves.pixelOf({panel}, {k})")
+        # below the picture, which stays in sight on a phone
+        top = page.evaluate(
+            "document.getElementById('curves').getBoundingClientRect().top + scrollY"
+        )
+        page.evaluate(f"scrollTo(0, {top + y - 680})")
+        box = page.locator("#curves").bounding_box()
         page.mouse.click(box["x"] + x, box["y"] + y)
         assert state(page)["index"] == pytest.approx(k, abs=1)
     assert page.complaints == []

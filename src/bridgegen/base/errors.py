@@ -58,7 +58,7 @@ class UnknownNameError(InputError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         names = sorted(known)
-        near = get_close_matches(name, names, n=1, cutoff=0.55)
+        near = get_close_matches(name, names, n=1, cutoff=0.5 if len(name) < 3 else 0.55)
         hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(names)}"
         super().__init__(f"unknown {kind} '{name}'; {hint}")
 

@@ -3,11 +3,12 @@
   const root = document.documentElement, button = document.getElementById("theme"), system = matchMedia("(prefers-color-scheme: dark)");
   const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]).filter((rule) => rule.media?.mediaText.includes("prefers-color-scheme"));
   let dark = system.matches;
+  const name = () => { if (button) button.textContent = dark ? "Light" : "Dark"; };
   const apply = () => {
     for (const { media } of rules) media.mediaText = dark ? "screen" : "not all";
     root.style.colorScheme = dark ? "dark" : "light";
-    button.textContent = dark ? "Light" : "Dark";
     document.dispatchEvent(new Event("theme"));
+    name();
   };
   const kept = (value) => {
     try { // a page in a frame, or without storage, forgets it
@@ -17,8 +18,8 @@
   };
   if (button) {
     const chosen = kept();
-    dark = chosen ? chosen === "dark" : dark;
-    apply();
+    if (chosen && (chosen === "dark") !== dark) { dark = !dark; apply(); }
+    name();
     button.hidden = false;
     button.addEventListener("click", () => { dark = !dark; kept(dark ? "dark" : "light"); apply(); });
   }
