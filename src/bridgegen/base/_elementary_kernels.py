@@ -452,7 +452,7 @@ def log2(x):
 
 @kernel
 def power(x, y):
-    """Return x to the y, within 1 ulp, as IEEE 754's pow; NaN of a root of less than 0."""
+    """Return x to the y, within 1.5 ulp, as IEEE 754's pow; NaN of a root of less than 0."""
     if y == 0.0 or x == 1.0:
         return 1.0
     if x != x or y != y:
