@@ -102,15 +102,17 @@ def _write(
 
 
 def _banner(suite: SuiteRun, page: Mapping[str, Any]) -> Banner:
-    """Return the verdict on the last ego; of two, what the second fixes and breaks."""
-    found = suite.of_ego(suite.egos[-1])
-    verdicts = {result.verdict for result in found}
+    """Return the verdict on all egos; of two, on the second, and what it fixes and breaks."""
+    egos = suite.egos[-1:] if page["changes"] else suite.egos
+    verdicts = {result.verdict for ego in egos for result in suite.of_ego(ego)}
     kind, word = "passes", "PASSES"
     if "failed" in verdicts:
         kind, word = "fails", "FAILS"
     elif verdicts != {"passed"}:
         kind, word = "open", "NOT JUDGED"
-    return Banner(page["changes"] or f"{'; '.join(page['headlines'])}.", kind, word)
+    if page["changes"]:
+        return Banner(f"{page['egos'][-1]}: {page['changes']}", kind, word)
+    return Banner(f"{'; '.join(page['headlines'])}.", kind, word)
 
 
 def command_of(folder: Path, job: Job, result: EntryResult) -> str:
