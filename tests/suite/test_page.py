@@ -304,6 +304,27 @@ def test_the_command_shows_the_failure_again(run, folder):
     assert words[5:] == [number, "--ego", varied.ego]
 
 
+@pytest.mark.parametrize(
+    ("outcomes", "kind"),
+    [
+        ({"a": KEPT}, "passes"),
+        ({"a": HIT}, "fails"),
+        ({"a": LOST}, "open"),
+        ({"a": HIT, "b": KEPT, "c": KEPT}, "fails"),  # whichever of several fails
+        ({"a": KEPT, "b": LOST, "c": KEPT}, "open"),
+        ({"a": HIT, "b": KEPT}, "passes"),  # of two the second, which is named
+        ({"a": KEPT, "b": HIT}, "fails"),
+    ],
+)
+def test_the_page_begins_with_the_verdict(tmp_path, outcomes, kind):
+    results = [result("e", rows=(row,), ego=ego) for ego, row in outcomes.items()]
+    text = write_suite_page(suite_of(*results, folder=tmp_path), ()).read_text("utf-8")
+    (banner,) = re.findall(r'<div class="banner (\w*)" role="status">.*?<p>(.*?)</p>', text)
+    assert banner[0] == kind
+    if len(outcomes) == 2:
+        assert banner[1].startswith("b: ")
+
+
 def test_hostile_texts_stay_texts(tmp_path):
     bad = "</script><script>alert(1)</script><!-- \ud800 &amp; {{data}}"
     row = HIT.model_copy(update={"conflict": "contact", "partner": bad, "x": [bad]})

@@ -111,7 +111,9 @@ def _banner(found: Dashboard) -> Banner:
     text = " ".join(filter(None, (failing_sentence(found), requirements_sentence(found))))
     if found.failing or found.violated:
         return Banner(text, "fails", "FAILS")
-    unsure = found.project.problems or any(result.unjudged for result in found.project.results)
+    unsure = found.project.problems or any(
+        result.unjudged or not result.finished for result in found.project.results
+    )
     if unsure or not found.project.results:
         return Banner(text, "open", "NOT JUDGED" if found.project.results else "")
     return Banner(text, "passes", "NO FAILURE FOUND")
