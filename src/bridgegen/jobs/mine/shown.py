@@ -10,6 +10,7 @@ from bridgegen.base.units import percent
 from bridgegen.jobs.frame import Table
 from bridgegen.jobs.mine.mine import Mined, Summary
 from bridgegen.jobs.mine.near_misses import conflicts_as_json, recordings_in_words, screen_rows
+from bridgegen.pages.templates import counted, joined
 from bridgegen.recordings.events.of_scenarios import encounters_of
 from bridgegen.recordings.events.tables import against_in_words, kind_rows, rates_in_words
 from bridgegen.recordings.scenarios.files import FOLDER as SCENARIOS
@@ -31,9 +32,10 @@ def warnings_of(mined: Mined) -> list[str]:
         if recording.lanes.source == "map"
         for note in recording.lanes.notes
     ]
-    found = [f"warning: skipped: {text}" for _, texts in mined.skipped for text in texts]
+    found = [f"warning: not read: {text}" for text in mined.unread]
     if mined.others:
-        found.append(f"note: {len(mined.others)} files are no recordings")
+        names = joined([path.name for path in mined.others])
+        found.append(f"note: {counted(len(mined.others), 'file')} without recording: {names}")
     return [*found, *(f"warning: {text}" for text in (*mined.warnings, *notes))]
 
 
@@ -54,7 +56,10 @@ def json_of(mined: Mined) -> dict[str, Any]:
             }
             for replay in mined.replays
         ],
-        "skipped": [str(path) for path, _ in mined.skipped],
+        "skipped": [
+            {"file": str(path), "reason": reason}
+            for (path, _), reason in zip(mined.skipped, mined.unread, strict=True)
+        ],
         "others": [str(path) for path in mined.others],
         **_events(mined),
         "mined": [made_as_json(scenario, mined.out) for scenario in mined.mined],
@@ -90,8 +95,11 @@ def shown_of(mined: Mined) -> Iterator[str | Table]:
     else:
         yield "quality: nothing to clean"
     yield ""
-    for name, text in recordings_in_words(mined):
+    conflicts = recordings_in_words(mined)
+    for name, text in conflicts:
         yield f"{name}: {text}"
+    if none := len(mined.recordings) - len(conflicts):
+        yield f"{counted(none, 'recording')} without near miss"
     if mined.replays:
         yield ""
         of_events = (
