@@ -130,7 +130,7 @@ def _carried(
     above: bool,
     is_named: bool,
 ) -> Markup:
-    """Return a body, with its name if it is to have one, that goes through poses ``(n, 3)``, hidden while not there."""
+    """Return a body that goes through poses ``(n, 3)``, hidden while it is not there."""
     # The body is drawn at the origin, heading to the right; the animation carries it from there.
     alone, name = SvgDraw(SIZE, GROUND), SvgDraw(SIZE, GROUND)
     camera = Camera(0.0, 0.0, view.camera.scale, (0.0, 0.0))

@@ -271,7 +271,7 @@ def mine(given: MineOptions) -> Mined:
 def _readable(
     file: Path, time_step: float, skipped: list[tuple[Path, tuple[str, ...]]]
 ) -> Iterator[tuple[RecordedTraffic, Cleaned]]:
-    """Yield the recordings in a file, cleaned; why it cannot be read, or not to its end, is noted."""
+    """Yield the recordings in a file, cleaned, and note why it cannot be read to its end."""
     try:
         for traffic in read(file):
             yield traffic, clean(traffic, time_step)

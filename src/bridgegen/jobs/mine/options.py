@@ -95,7 +95,8 @@ JOB = Job(
     Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
     Lanes are those of the map, or of the recording, or inferred from its paths. Near misses are
     found as in a search; the most critical ones become OpenSCENARIO files that replay them.
-    Files that cannot be read are skipped and listed. The format is detected from the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
+    Files that cannot be read are left out and listed.
+    The format is detected from the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
     CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
     Finds events (cut-in, cut-out, lead-brakes, approach, following, lane-change)
     and the parameters of the scenarios that declare theirs. Makes a logical
