@@ -153,7 +153,7 @@ def write_all(mined: Mined) -> None:
         others=[f"{path}: no recording" for path in mined.others],
     )
     for scenario in mined.mined:
-        if isinstance(scenario, MinedScenario):
+        if isinstance(scenario, MinedScenario) and scenario.fit is not None:
             exposure.write_page(
                 mined.out / SCENARIOS / f"{scenario.name}{ENDINGS[1]}", scenario.fit
             )

@@ -16,6 +16,7 @@ from bridgegen.recordings.events.tables import against_in_words, kind_rows, rate
 from bridgegen.recordings.scenarios.files import FOLDER as SCENARIOS
 from bridgegen.recordings.scenarios.files import made_as_json, made_row
 from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade
+from bridgegen.recordings.scenarios.ranges import held_in_words
 from bridgegen.recordings.scenarios.update import ENDING as DIFF
 from bridgegen.recordings.scenarios.update import in_words
 from bridgegen.scenario.exposure.exposure import Encounters
@@ -124,12 +125,15 @@ def shown_of(mined: Mined) -> Iterator[str | Table]:
         yield ""
         of_made = ("mined scenario", "events", "per hour (95 %)", "parameters beyond the source's")
         yield Table(of_made, [made_row(scenario) for scenario in made])
+        for scenario in made:
+            if scenario.fit is None:
+                yield f"{scenario.name}: {held_in_words(scenario.events)}; no distribution"
     tables = ("recordings", "lanes", "quality", "events", "conflicts")
     yield f"\n{'page':<12}{mined.out / 'recordings.html'}"
     yield f"{'tables':<12}{', '.join(str(mined.out / f'{name}.csv') for name in tables)}"
     yield f"{'events':<12}{mined.out / 'events'}, a table per scenario"
     if made:
-        yield f"{'mined':<12}{mined.out / SCENARIOS}, a scenario, its fit and its distribution each"
+        yield f"{'mined':<12}{mined.out / SCENARIOS}, a scenario each, its fit and its distribution"
     for update in mined.updates:
         yield ""
         for text in in_words(update):
