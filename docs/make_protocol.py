@@ -22,7 +22,10 @@ FILE = Path(messages.__file__).with_name("protocol.json")
 
 ABOUT = (
     "Messages between BridgeGen and a driver in another process, version 1. A message is a map in "
-    "msgpack, behind its length: four bytes, unsigned, little-endian, at most 67108864. BridgeGen "
+    "msgpack, behind its length: four bytes, unsigned, little-endian, at most 67108864. Who "
+    "answers hello in JSON gets JSON from then on: arrays are nested lists there, numbers that "
+    "are not finite the texts Infinity, -Infinity and NaN, and an answer has at most 16777216 bytes. "
+    "BridgeGen "
     "sends hello, reset and act; the driver answers each before the next is sent: hello, ready, "
     "and control or trajectory; or error. The end of the stream is the end. Readers ignore keys "
     "that they do not know. 'dtype' and 'shape' beside a $ref say what an array must be; letters "

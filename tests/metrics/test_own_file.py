@@ -57,7 +57,7 @@ def test_a_search_records_it_and_the_page_and_the_table_show_it(own, tmp_path):
     assert (found > 5.0).all()
     settings = Run(out).settings
     (known,) = settings.own_metrics
-    assert (settings.metrics, known["code"], known["unit"]) == ([own], own, "m/s")
+    assert (settings.metrics, known["code"], known["unit"]) == ((own,), own, "m/s")
     assert shlex.join(["--metrics", own]) in settings.command(out)
     page = (out / "report.html").read_text("utf-8")
     assert "largest speed of the ego" in page
