@@ -9,6 +9,7 @@ from tests.approval import approve, refuses
 from tests.pages import without_theme
 
 from bridgegen.base.errors import BridgeGenError, InputError
+from bridgegen.base.units import percent
 from bridgegen.cli import main
 from bridgegen.openx.openscenario.distributions import distribution_of, read_distribution
 from bridgegen.scenario.exposure import read_exposure
@@ -152,8 +153,10 @@ def test_few_events_are_weighed_with_a_prior(scenario, planted, events, count):
         seen[-1] = 1.0
         wanted = share * seen + (1.0 - share) * before.tails(edges)[0]
         assert marginal.tails(edges)[0] == pytest.approx(wanted, abs=1e-5)
-    told = f"{count} events count {share:.0%}"
+    told = f"{count} events count {percent(share)}, and {percent(1.0 - share)} is the prior"
     assert told in made.exposure.source
+    assert told in made.exposure.weighed
+    assert f"{percent(1.0 - share)} of it is the prior" in [*made.facts()]
     assert any(told in remark for remark in made.remarks())
     assert made.exposure.encounters.per_hour.estimate == pytest.approx(
         made.exposure.encounters.count / 2.0

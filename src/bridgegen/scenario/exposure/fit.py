@@ -21,9 +21,10 @@ import scipy
 
 from bridgegen.base.arrays import Float, as_float
 from bridgegen.base.errors import InputError
+from bridgegen.base.units import percent
 from bridgegen.scenario.exposure.candidates import Candidate, candidates, fit
 from bridgegen.scenario.exposure.dependence import GaussianCopula
-from bridgegen.scenario.exposure.exposure import Exposure
+from bridgegen.scenario.exposure.exposure import WEIGHED, Exposure
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
 from bridgegen.scenario.exposure.marginals import Conditional, Form, Marginal
 from bridgegen.scenario.exposure.reader import build_exposure, chosen_exposure, exposure_text
@@ -131,6 +132,8 @@ class Fit:
                     yield rate.in_words(unit)
         yield f"{self.exposure.feasible_share.estimate:.2%} keep the constraints"
         yield f"seed {self.seed}"
+        if self.exposure.weighed:
+            yield f"{percent(LEAST_ROWS / (self.used + LEAST_ROWS))} of it is the prior"
 
     def remarks(self) -> list[str]:
         """Return what a reader must know, a sentence each."""
@@ -231,7 +234,7 @@ def fit_exposure(
         correlation = share * correlation + (1.0 - share) * known
         resampled = share * resampled + (1.0 - share) * known
         weighed = (
-            f"Weighed with a prior: {used} events count {share:.0%}, and {1.0 - share:.0%} "
+            f"{WEIGHED} {used} events count {percent(share)}, and {percent(1.0 - share)} "
             f"is the prior ({before.source.strip().rstrip('.')})."
         )
     data: dict[str, Any] = {
