@@ -22,7 +22,7 @@ SMALL = 560, 250
 EVERY = 0.2  # s, between two states of the picture
 SPACE = 12.0  # m, around both paths
 LEAST = 30.0  # m, that the picture shows
-BORDER = "#a9afb6"
+BORDER = "#7d8790"  # seen on light and dark ground
 STANDS = 1.0  # m; over a shorter way the ego's heading says where it goes
 
 
