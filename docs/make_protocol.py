@@ -21,14 +21,16 @@ from bridgegen.drivers.remote import messages
 FILE = Path(messages.__file__).with_name("protocol.json")
 
 ABOUT = (
-    "Messages between BridgeGen and a driver in another process, version 1. A message is a map in "
-    "msgpack, behind its length: four bytes, unsigned, little-endian, at most 67108864. BridgeGen "
-    "sends hello, reset and act; the driver answers each before the next is sent: hello, ready, "
-    "and control or trajectory; or error. The end of the stream is the end. Readers ignore keys "
-    "that they do not know. 'dtype' and 'shape' beside a $ref say what an array must be; letters "
-    "stand for sizes: N scenarios, M other participants, P points of the route, H instants of the "
-    "history, W ways of a participant, Q pieces of the map nearby, L lights, R road networks, K "
-    "and C and V others. SI units and radians."
+    "Messages between BridgeGen and a driver in another process, version 1. A message is a map in"
+    " msgpack, behind its length: four bytes, unsigned, little-endian, at most 67108864. Who "
+    "answers hello in JSON gets JSON from then on: arrays are nested lists there, numbers that "
+    "are not finite the texts Infinity, -Infinity and NaN, and an answer has at most 16777216 "
+    "bytes. BridgeGen sends hello, reset and act; the driver answers each before the next is "
+    "sent: hello, ready, and control or trajectory; or error. The end of the stream is the end. "
+    "Readers ignore keys that they do not know. 'dtype' and 'shape' beside a $ref say what an "
+    "array must be; letters stand for sizes: N scenarios, M other participants, P points of the "
+    "route, H instants of the history, W ways of a participant, Q pieces of the map nearby, L "
+    "lights, R road networks, K and C and V others. SI units and radians."
 )
 
 _ENTRY = re.compile(r"^ {4}(\w+): (.*?)(?=^ {4}\w+: |\Z)", re.M | re.S)

@@ -47,6 +47,7 @@ def test_old_names_run(cli, tmp_path, monkeypatch):
     [
         (("suite", "nowhere.xosc", "--map"), "--preventability"),
         (("fit", "cut-in", "nowhere.csv", "--others", "default"), "--without-column"),
+        (("mine", "nowhere.csv", "--lenient"), "--lenient"),
         (("ontology", "import", "nowhere.xosc", "--ego", "Hero"), "--entity"),
         (("analyse", "recording", "nowhere.csv", "--ego=Hero"), "--entity"),
     ],

@@ -42,7 +42,7 @@ GIVEN = {
     "safety-case": {"runs": (Path("/runs/a"), Path("/runs/b"))},
     "mine": {
         "recordings": (Path("/recorded/a.csv"),), "road_map": Path("/recorded/a.xodr"),
-        "lenient": True, "time_step": 0.1, "scenarios": (Path("/mine/a.yaml"),),
+        "time_step": 0.1, "scenarios": (Path("/mine/a.yaml"),),
         "update": (Path("/mine/b.yaml"),), "ego": "careful", "keep": 3,
     },
     "benchmark planners": {

@@ -9,6 +9,7 @@ from tests.approval import approve, refuses
 from tests.pages import without_theme
 
 from bridgegen.base.errors import BridgeGenError, InputError
+from bridgegen.base.units import percent
 from bridgegen.cli import main
 from bridgegen.openx.openscenario.distributions import distribution_of, read_distribution
 from bridgegen.scenario.exposure import read_exposure
@@ -136,6 +137,35 @@ def test_too_few_rows_say_how_many_are_needed(scenario, events):
     few = {name: values[: LEAST_ROWS - 1] for name, values in events.items()}
     with refuses(InputError, "47", "46"):
         fit_exposure(scenario, few, others="default")
+
+
+@pytest.mark.parametrize("count", [1, 9, 47])
+def test_few_events_are_weighed_with_a_prior(scenario, planted, events, count):
+    few = {name: values[:count] for name, values in events.items()}
+    made = fit_exposure(
+        scenario, few, others="default", hours=2.0, prior=planted, replicates=20, seed=1
+    )
+    share = count / (count + 47)
+    for name in NAMES:
+        marginal, before = made.exposure.marginals[name], planted.marginals[name]
+        edges = np.array(made.parameters[name].section["edges"])
+        seen = (few[name][:, np.newaxis] < edges).mean(axis=0)
+        seen[-1] = 1.0
+        wanted = share * seen + (1.0 - share) * before.tails(edges)[0]
+        assert marginal.tails(edges)[0] == pytest.approx(wanted, abs=1e-5)
+    told = f"{count} events count {percent(share)}, and {percent(1.0 - share)} is the prior"
+    assert told in made.exposure.source
+    assert told in made.exposure.weighed
+    assert f"{percent(1.0 - share)} of it is the prior" in [*made.facts()]
+    assert any(told in remark for remark in made.remarks())
+    assert made.exposure.encounters.per_hour.estimate == pytest.approx(
+        made.exposure.encounters.count / 2.0
+    )
+    names = made.exposure.names
+    i, j = names.index("ego_speed"), names.index("gap")
+    scores = made.exposure.copula.matrix[i, j]
+    if count == 1:  # no correlation is seen
+        assert scores == pytest.approx((1.0 - share) * 0.6, abs=1e-4)
 
 
 def test_values_outside_are_counted_with_a_range_that_holds_them(scenario, events):

@@ -4,7 +4,9 @@ import csv
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from markupsafe import escape
 from tests.approval import approve, refuses
 from tests.mining.lanes.test_lanelets import with_lanelets as write_two_lanes
 from tests.openx.opendrive.kinds import model
@@ -13,7 +15,9 @@ from tests.recordings import writers as w
 
 from bridgegen.base.errors import FileFormatError, InputError, StorageError
 from bridgegen.jobs.mine.mine import mine
+from bridgegen.jobs.mine.near_misses import PLAYED
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.recordings.readers.formats import read
 from bridgegen.recordings.readers.quality import Rule
 
 
@@ -35,19 +39,98 @@ def test_hours_and_kilometres_are_those_of_all_participants(tmp_path):
     assert [one["rule"] for one in rows(out / "quality.csv")] == [rule.value for rule in Rule]
 
 
-def test_a_bad_file_ends_it_and_is_listed_if_that_is_asked_for(tmp_path):
+def test_a_broken_file_is_listed_and_the_others_are_read(cli, tmp_path):
     good, bad = w.write_ind(tmp_path), tmp_path / "bad.csv"
-    bad.write_text("time,entity,x,y,h,speed\n0,a,1,2,3,x\n")
-    with refuses(FileFormatError):
-        mine([good, bad], out=tmp_path / "mined")
-    assert not (tmp_path / "mined").exists()
-    found = mine([good, bad], out=tmp_path / "mined", lenient=True)
-    assert [path for path, _ in found.skipped] == [bad]
-    assert "bad.csv, line 2: speed must be a number" in (
-        tmp_path / "mined" / "recordings.html"
-    ).read_text(encoding="utf-8")
-    with refuses(FileFormatError):
-        mine([bad], out=tmp_path / "mined", lenient=True)
+    bad.write_text("time,entity,x,y,h,speed\n0,a,1,2,3,x\n0,a,1,y,3,4\n")
+    out = tmp_path / "mined"
+    code, text, err = cli("mine", tmp_path, "--out", out, "--json")
+    assert code == 0
+    (skipped,) = json.loads(text)["skipped"]
+    assert skipped["file"] == str(bad)
+    assert skipped["reason"].startswith(f"{bad}, line 2: speed must be a number")
+    assert [line for line in err.splitlines() if "bad.csv" in line] == [
+        f"bridgegen: warning: not read: {skipped['reason']}"
+    ]
+    page = (out / "recordings.html").read_text(encoding="utf-8")
+    assert escape(skipped["reason"]) in page
+    # Only a gate that compares problems, or cannot know, ends with a status of its own.
+    assert cli("mine", good, bad, "--out", out, "--fail-if", "skipped > 0")[0] == 3
+    assert cli("mine", good, bad, "--out", out, "--fail-if", "skipped > 1")[0] == 0
+    code, _, err = cli("mine", bad, "--out", tmp_path / "none")
+    assert (code, "bad.csv, line 2" in err) == (2, True)
+    assert not (tmp_path / "none").exists()
+
+
+def test_an_extra_that_is_not_installed_costs_its_files_only(tmp_path, monkeypatch):
+    good = w.write_ind(tmp_path)
+    other = w.write_womd(tmp_path)
+
+    def missing(path):
+        if path == other:
+            raise InputError(f"{path}: needs the extra 'parquet'")
+        return read(path)
+
+    monkeypatch.setattr("bridgegen.jobs.mine.mine.read", missing)
+    found = mine([good, other], out=tmp_path / "mined")
+    assert [path for path, _ in found.skipped] == [other]
+
+
+def test_a_mistyped_name_and_a_time_step_end_it_at_once(tmp_path):
+    good = w.write_ind(tmp_path)
+    with refuses(FileFormatError, "typo.csv"):
+        mine([good, tmp_path / "typo.csv"], out=tmp_path / "mined")
+    with refuses(InputError, "time_step"):
+        mine([good], time_step=9.0, out=tmp_path / "mined")
+
+
+def late_brakers(folder, count):
+    """Write recordings, in each of which a car brakes later and stops nearer to another."""
+    folder.mkdir()
+    for k in range(count):
+        t = 0.1 * np.arange(80)
+        v = np.clip(15.0 - 8.0 * np.clip(t - 2.0, 0.0, None), 0.0, None)
+        x = np.append(0.0, np.cumsum(0.05 * (v[1:] + v[:-1])))
+        stands = x[-1] + 5.0 + 0.04 * k
+        lines = ["time,entity,x,y,h,speed,length,width,centre"]
+        for i in range(len(t)):
+            lines.append(f"{t[i]:.2f},late<b>,{x[i]},0,0,{v[i]},4.6,1.8,1.4")
+            lines.append(f"{t[i]:.2f},there,{stands},0,0,0,4.6,1.8,1.4")
+        (folder / f"late-{k:02}.csv").write_text("\n".join(lines) + "\n")
+
+
+def test_the_page_of_many_recordings_begins_with_near_misses_that_play(tmp_path, page_of):
+    late_brakers(tmp_path / "data", 22)
+    found = mine(tmp_path / "data", keep=15, out=tmp_path / "mined")
+    ttc = [item.event.event.found.ttc for item in found.replays]
+    assert (len(ttc), ttc) == (15, sorted(ttc))
+    page = page_of(tmp_path / "mined" / "recordings.html", 1440)
+    assert page.evaluate("document.documentElement.scrollHeight") <= 6000
+    figures = page.locator("figure.card")
+    assert figures.count() == PLAYED
+    box = figures.first.bounding_box()
+    assert box["y"] + 0.5 * box["height"] < 900  # the first screen of 1440 by 900 shows it
+    nearest = f"came within {ttc[0]:.2f} s of the car there"
+    assert f"The car late<b> {nearest}" in figures.first.inner_text()
+    assert nearest in page.locator(".banner").inner_text()
+    assert page.locator(".banner b").inner_text() == "22 NEAR MISSES"
+    assert "--ego reference" in page.locator(".banner code").inner_text()
+    moves = figures.first.locator("animateTransform").all()
+    assert max(len(set(one.get_attribute("values").split(";"))) for one in moves) > 20
+    command = figures.nth(2).locator("figcaption > code").inner_text()
+    assert command == f"bridgegen simulate {tmp_path / 'mined' / 'critical' / '0003.xosc'}"
+    rows = page.locator("table.stacked").first.locator("tbody tr")
+    assert rows.count() == 22 - PLAYED
+
+
+@pytest.mark.parametrize("width", [390, 1440])
+def test_no_table_of_the_page_is_cut(tmp_path, page_of, width):
+    late_brakers(tmp_path / "data", 14)
+    mine(tmp_path / "data", out=tmp_path / "mined")
+    page = page_of(tmp_path / "mined" / "recordings.html", width)
+    page.evaluate("for (const one of document.querySelectorAll('details')) one.open = true")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for table in page.locator(".wide").all():
+        assert table.evaluate("one => one.scrollWidth - one.clientWidth") <= 0
 
 
 def test_a_file_counts_once(tmp_path):

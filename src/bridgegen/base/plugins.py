@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
 
 Kind = TypeVar("Kind")
+LISTED = 12
+"""Number of names that a message lists at most."""
 
 
 @dataclass(frozen=True)
@@ -189,18 +191,18 @@ def module_of(where: str) -> ModuleType:
     return module
 
 
-def class_of(name: str, what: str) -> type[Any]:
-    """Return a class of the user's own.
+def object_of(name: str, what: str, kind: type[Kind], noun: str) -> Kind:
+    """Return an object of the user's own.
 
     Args:
-        name: ``module:Class`` or ``file.py:Class``.
+        name: ``module:NAME`` or ``file.py:NAME``.
         what: it is, for messages: "--detector".
+        kind: of which it must be.
+        noun: what that is called: "class".
 
     Raises:
-        InputError: there is no such module, file or class, or importing it raises.
+        InputError: there is no such module, file or object, or importing it raises.
     """
-    if not is_own(name):
-        raise InputError(f"{what} must read module:Class or file.py:Class, got '{name}'")
     where, _, wanted = name.rpartition(":")
     try:
         module = module_of(where)
@@ -211,6 +213,25 @@ def class_of(name: str, what: str) -> type[Any]:
             f"{what}: {where} cannot be imported: {type(error).__name__}: {error}"
         ) from error
     found = getattr(module, wanted, None)
-    if not isinstance(found, type):
-        raise InputError(f"{what}: {where} must have a class '{wanted}'")
+    if not isinstance(found, kind):
+        # What a module imports from elsewhere is not what it offers.
+        has = [
+            key
+            for key, value in vars(module).items()
+            if isinstance(value, kind)
+            and (not isinstance(value, type) or value.__module__ == module.__name__)
+        ]
+        offers = f", and has: {', '.join(has[:LISTED])}" if has else ", and has none"
+        raise InputError(f"{what}: {where} must have a {noun} '{wanted}'{offers}")
     return found
+
+
+def class_of(name: str, what: str) -> type[Any]:
+    """Return a class of the user's own; see `object_of`.
+
+    Raises:
+        InputError: there is no such module, file or class, or importing it raises.
+    """
+    if not is_own(name):
+        raise InputError(f"{what} must read module:Class or file.py:Class, got '{name}'")
+    return object_of(name, what, type, "class")

@@ -449,6 +449,13 @@ def fit(
     source: Annotated[
         str | None, typer.Option(help="Where the events come from, for the file.")
     ] = None,
+    prior: Annotated[
+        str | None,
+        typer.Option(
+            help="An exposure that counts as 47 events besides these, so that few are enough: "
+            "uniform, an example's name, or a file."
+        ),
+    ] = None,
     replicates: Annotated[int, typer.Option(help="Resampled fits, for bands and p values.")] = 200,
     seed: Annotated[int, typer.Option(help="Seed of the random number generator.")] = 0,
     as_json: options.Json = False,
@@ -465,7 +472,8 @@ def fit(
     with FitProgress() as live:
         fitted, written = write_fit(
             scenario, events, out=out, page=page, xosc=xosc, hours=hours, km=km,
-            ignore=ignore or (), others=without_column, source=source, replicates=replicates,
+            ignore=ignore or (), others=without_column, source=source, prior=prior,
+            replicates=replicates,
             seed=seed, progress=live.progress, notes=notes,
         )  # fmt: skip
     for note in notes:

@@ -44,9 +44,10 @@ RENAMED_OPTIONS = {
     "fit": {"--others": "--without-column"},
     "import": {"--ego": "--entity"},
     "recording": {"--ego": "--entity"},
+    "mine": {"--lenient": ""},
     "suite": {"--map": "--preventability"},
 }
-"""Old spellings of options by command, likewise."""
+"""Old spellings of options by command, likewise; "" of flags that say what is always done now."""
 
 MANY = 20
 """Number of options above which the help of a command leaves out those that are `RARE`."""
@@ -119,6 +120,12 @@ class GroupedCommand(TyperCommand):
             if new := renamed.get(old):
                 args[place] = f"{new}{equals}{value}"
                 _tell_new(ctx, old, new)
+            elif new == "" and not ctx.resilient_parsing:
+                print(
+                    f"bridgegen: note: {old} is not needed any more: it is always so",
+                    file=sys.stderr,
+                )
+        args = [word for word in args if renamed.get(word) != ""]
         if "--help-all" in args:
             ctx.meta[_WHOLE] = args = ["--help"]
         single = {

@@ -46,6 +46,10 @@ OwnBaseline = Annotated[
 OwnAlgorithm = Annotated[
     str | None, _text("--algorithm", "The run's algorithm, if it is your own.", SEARCH)
 ]
+OwnMetrics = Annotated[
+    str | None,
+    _text("--metrics", "The run's metrics of your own, separated by commas.", OUTPUT),
+]
 Ideal = Annotated[str | None, declaration("ideal", shown="the file's")]
 Vehicle = Annotated[str | None, declaration("vehicle")]
 TimeLimit = Annotated[float | None, declaration("time_limit")]

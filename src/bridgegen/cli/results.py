@@ -16,6 +16,7 @@ from bridgegen.cli.connection import (
     with_connection_options,
     with_map_folder,
 )
+from bridgegen.engine.options.forms import read_names
 from bridgegen.engine.options.option import SIMULATOR
 
 
@@ -108,6 +109,7 @@ def regions(
     exposure: options.Exposure = None,
     ego: options.OwnEgo = None,
     worse_than: options.OwnBaseline = None,
+    metrics: options.OwnMetrics = None,
     connection: Connection = NO_CONNECTION,
     workers: options.Workers = None,
     as_json: options.Json = False,
@@ -125,6 +127,7 @@ def regions(
             run,
             ego=ego,
             worse_than=worse_than,
+            metrics=read_names(metrics),
             simulator=read_access(connection),
             samples=samples,
             at_least=at_least,
@@ -161,6 +164,7 @@ def confirm(
     ] = None,
     again: Annotated[bool, typer.Option("--again", help="Discard earlier confirmations.")] = False,
     ego: options.OwnEgo = None,
+    metrics: options.OwnMetrics = None,
     workers: options.Workers = None,
     fail_if: options.ConfirmFailIf = None,
     junit: options.Junit = None,
@@ -185,6 +189,7 @@ def confirm(
             rows=rows,
             again=again,
             ego=ego,
+            metrics=read_names(metrics),
             workers=workers,
             stage=live.stage,
             progress=live.progress,

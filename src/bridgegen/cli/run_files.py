@@ -47,7 +47,7 @@ _FORMS: Mapping[Any, FileForm] = {
 _CRITERIA = "criteria"
 _YAML = (".yaml", ".yml")
 
-_CODE = {"algorithm", "detector", "ego", "egos", "drivers", "worse_than"}
+_CODE = {"algorithm", "detector", "ego", "egos", "drivers", "metrics", "worse_than"}
 """Options whose values are a path in front of a colon, or a path if they end in ``.fmu``."""
 
 _FILES = {SCENARIO, "scenarios", "files", "exposure", "events"}

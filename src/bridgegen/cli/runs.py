@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bridgegen.base.errors import BridgeGenError, InputError, Interrupted
+from bridgegen.base.plugins import is_own
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
@@ -79,6 +80,7 @@ def search_all(
                         ego=values.get("ego"),
                         worse_than=values.get("worse_than"),
                         algorithm=values.get("algorithm"),
+                        metrics=[name for name in values.get("metrics") or () if is_own(name)],
                         callbacks=live.callbacks,
                     )
                 print_summary(run, live.seconds)
@@ -196,6 +198,7 @@ def resume(
     ego: common.OwnEgo = None,
     worse_than: common.OwnBaseline = None,
     algorithm: common.OwnAlgorithm = None,
+    metrics: common.OwnMetrics = None,
     connection: Connection = NO_CONNECTION,
     workers: common.Workers = None,
     fail_if: common.FailIf = None,
@@ -217,6 +220,7 @@ def resume(
             ego=ego,
             worse_than=worse_than,
             algorithm=algorithm,
+            metrics=read_names(metrics),
             simulator=read_access(connection),
             workers=workers,
             callbacks=live.callbacks,

@@ -148,8 +148,9 @@ class Pipeline:
             embedded.duration,
             named,
         )
+        named_metrics = measures.read(options.metrics)
         if recorded is None:
-            also = (*options.metrics, *self.monitor.metrics)
+            also = (*named_metrics, *self.monitor.metrics)
             recorded = metrics_of(scenario, self.driver, also, detects=sees)
         self.baseline = self._baseline_of(options)
         margins = [name for name in recorded if name.startswith(PREFIX)]
@@ -208,11 +209,11 @@ class Pipeline:
         return self._recipe_of(_remade)
 
     def _recipe_of(self, make: Callable[..., Any]) -> Recipe:
-        named = (self._options.ego, self._options.worse_than)
+        named = (self._options.ego, self._options.worse_than, *self._options.metrics)
         carried = tuple(CarriedDriver.of(name) if name else None for name in named)
-        # The drivers go with the bytes of their files: a path on this machine says nothing on
-        # another, and the file may be edited while the search runs.
-        options = replace(self._options, ego=None, worse_than=None)
+        # Drivers and metrics go with the bytes of their files: a path on this machine says nothing
+        # on another, and the file may be edited while the search runs.
+        options = replace(self._options, ego=None, worse_than=None, metrics=())
         return Recipe.of(make, carried, options, recorded=self.metrics, **self._made_with)
 
     @property
@@ -596,14 +597,15 @@ class EvaluationStream:
         self._rows.close()
 
 
-Carried = tuple[CarriedDriver | None, CarriedDriver | None]
+Carried = tuple[CarriedDriver | None, ...]
 """The ego's driver and the baseline's."""
 
 
 def _remade(carried: Carried, options: PipelineOptions, **made_with: Any) -> Pipeline:
     """Return a pipeline for a worker, in one thread, with its kernels compiled."""
-    ego, baseline = (driver.here() if driver else None for driver in carried)
-    options = replace(options, ego=ego, worse_than=baseline)
+    ego, baseline, *metrics = (code.here() if code else None for code in carried)
+    named = tuple(name for name in metrics if name)
+    options = replace(options, ego=ego, worse_than=baseline, metrics=named)
     # One thread: a worker is one core, and its chunks come from outside.
     pipeline = Pipeline(options=options, **made_with, workers=Threads(1))
     pipeline.warm_up()
@@ -612,7 +614,8 @@ def _remade(carried: Carried, options: PipelineOptions, **made_with: Any) -> Pip
 
 def _compile_ahead(carried: Carried, options: PipelineOptions, **made_with: Any) -> None:
     """Compile what a pipeline will need; a driver of the user's own is not made for it."""
-    ego, _ = carried
+    ego, _, *metrics = carried
+    measures.read(code.here() for code in metrics if code)
     made_with["recorded"] = [n for n in made_with["recorded"] if not n.startswith(OF_BASELINE)]
     if ego and (egos.is_spec(ego.name) or egos.is_planner(ego.name)):
         options = replace(options, ego=None, ideal=(), metrics=())

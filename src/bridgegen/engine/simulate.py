@@ -186,7 +186,7 @@ def measured(
 ) -> tuple[str, ...]:
     """Return the names of the metrics to report, all of which exist."""
     names = (*measures.existing(tuple(measures.METRICS), held), *quantities.MEASURED)
-    asked = tuple(dict.fromkeys((*(metrics or names), *also)))
+    asked = tuple(dict.fromkeys((*measures.read(metrics or names), *also)))
     return quantities.require(asked, held, f"the driver '{driver}'")
 
 

@@ -28,6 +28,7 @@ def write_fit(
     ignore: Sequence[str] = (),
     others: str | None = None,
     source: str | None = None,
+    prior: str | None = None,
     replicates: int = 200,
     seed: int = 0,
     progress: Progress | None = None,
@@ -46,6 +47,7 @@ def write_fit(
         ignore: likewise.
         others: likewise.
         source: likewise.
+        prior: likewise.
         replicates: likewise.
         seed: likewise.
         progress: likewise.
@@ -73,6 +75,7 @@ def write_fit(
         ignore=ignore,
         others=cast(Literal["uniform", "default"] | None, others),
         source=source,
+        prior=prior,
         replicates=replicates,
         seed=seed,
         progress=progress,

@@ -116,7 +116,7 @@ def test_errors_obey_the_schema(tmp_path):
 class Noted:
     """A wire to a server's end in this process; it notes the length of each request."""
 
-    has_more = False
+    has_more = is_json = False
 
     def __init__(self, driver):
         self.driver, self.maps, self.sent = driver, [], []

@@ -57,7 +57,7 @@ def test_it_writes_scenarios_their_fits_and_the_difference(cli, tmp_path, record
     diff = (out / "my.yaml.diff").read_text(encoding="utf-8")
     assert diff in text
     assert f"--- {mine}\n+++ {mine}\n" in diff
-    (none,) = [line for line in text.splitlines() if ": no scenario: 0 events; 47 are" in line]
+    (none,) = [line for line in text.splitlines() if ": no scenario: 0 events; 5 are" in line]
     assert "cut-in" in none.split(":")[0].split(", ")
     scenario = load(out / "scenarios" / "slower-lead-mined.yaml")
     exposure = exposure_of(scenario)

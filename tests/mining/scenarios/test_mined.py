@@ -1,5 +1,7 @@
 """Mined scenarios hold what was seen, keep their constraints, and say how often they are met."""
 
+import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +15,13 @@ from tests.mining.scenarios.planted import HOURS, KM, approaches, events, met, s
 from bridgegen.recordings.events.event import NOT_WHOLE
 from bridgegen.recordings.scenarios import mined
 from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade, mined_scenario
-from bridgegen.recordings.scenarios.ranges import Range, around, bounds_of_speeds, with_room
+from bridgegen.recordings.scenarios.ranges import (
+    Range,
+    around,
+    bounds_of_speeds,
+    held_in_words,
+    with_room,
+)
 from bridgegen.scenario.exposure import exposure_of
 from bridgegen.scenario.language.constraints import Constraints
 from bridgegen.scenario.language.expression import parse
@@ -82,12 +90,37 @@ def test_the_same_events_give_the_same_bytes(tmp_path):
     assert texts[0] == texts[1]
 
 
+def test_few_events_make_ranges_that_say_what_they_hold(tmp_path):
+    result, made = make(sought(SLOWER), approaches(20), tmp_path)
+    assert isinstance(result, MinedScenario)
+    assert result.fit is None
+    scenario = read(result, tmp_path)
+    for name in ("ego_speed", "slower_by", "gap"):
+        assert scenario.parameters[name].low <= made.rows[name].min()
+        assert scenario.parameters[name].high >= made.rows[name].max()
+    # Wilks's own table: 93 for 95 %; of 20, the root of 1 - 20 p^19 + 19 p^20 = 0.95 is 0.784.
+    assert "holds at least 78 % of such encounters with 95 % confidence" in scenario.source
+    assert not any("at least" in fact for fact in make(
+        sought(SLOWER), approaches(60), tmp_path)[0].facts())  # fmt: skip
+    assert "exposure:" not in result.text
+
+
+@given(st.integers(2, 46), st.integers(0, 2**32 - 1))
+def test_ranges_hold_that_share_with_that_confidence(count, seed):
+    told = float(re.search(r"at least ([\d.]+) %", held_in_words(count))[1]) / 100.0
+    # Shares of a uniform distribution, without loss of generality: 4,000 samples of so many.
+    values = np.random.default_rng(seed).random((4000, count))
+    kept = (np.ptp(values, axis=1) >= told - 0.005).mean()
+    assert kept >= 0.95 - 4.5 * math.sqrt(0.95 * 0.05 / 4000)
+
+
 def test_too_few_events_make_none_and_say_how_many_are_needed(tmp_path):
-    result, _ = make(sought(SLOWER), approaches(46), tmp_path)
-    assert result == Unmade("slower-lead", "46 events; 47 are needed")
+    result, _ = make(sought(SLOWER), approaches(4), tmp_path)
+    enough = "5 are needed for ranges, 47 for a distribution"
+    assert result == Unmade("slower-lead", f"4 events; {enough}")
     close = approaches(60, gap=np.full(60, 3.0))
     result, _ = make(sought(SLOWER), close, tmp_path)
-    assert result == Unmade("slower-lead", "0 of 60 events keep its constraints; 47 are needed")
+    assert result == Unmade("slower-lead", f"0 of 60 events keep its constraints; {enough}")
 
 
 def test_a_range_ends_where_the_scenario_cannot_hold_more(tmp_path):

@@ -7,11 +7,14 @@ from bridgegen.assess.metrics.metric import Metric, Need, Quantity
 from bridgegen.assess.metrics.registry import (
     METRICS,
     TABLE_I,
+    about,
     evaluate,
     existing,
     get,
     held_by,
+    read,
     require,
+    stand_in,
     to_record,
 )
 
@@ -21,10 +24,13 @@ __all__ = [
     "Metric",
     "Need",
     "Quantity",
+    "about",
     "evaluate",
     "existing",
     "get",
     "held_by",
+    "read",
     "require",
+    "stand_in",
     "to_record",
 ]

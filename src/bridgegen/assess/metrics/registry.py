@@ -4,8 +4,11 @@ A new one: a function and its ``Metric`` in the file of its family, and one entr
 package's: an entry point of the group ``bridgegen.assess.metrics``.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+import hashlib
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +26,7 @@ from bridgegen.assess.metrics.road import L_OFFSET, R_RED
 from bridgegen.assess.metrics.times import PET, TET, THW, TIT, TTC
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError, UnknownNameError
-from bridgegen.base.plugins import PlugIns, Registry
+from bridgegen.base.plugins import PlugIns, Registry, file_of, is_own, object_of
 from bridgegen.drivers import DRIVERS, Driver
 from bridgegen.simulation.rollout import Rollout
 
@@ -74,25 +77,28 @@ def _checked(found: object, name: str) -> Metric:
         raise InputError(
             f"{ADDED.place(name)} has the name '{found.name}'; the two names must agree"
         )
+    return _with_checks(found, ADDED.place(name))
+
+
+def _with_checks(found: Metric, place: str) -> Metric:
+    """Return another's metric whose results are checked."""
 
     def compute(rollout: Rollout) -> Float:
         try:
             values = np.asarray(found.compute(rollout), dtype=np.float64)
         except Exception as error:
-            raise InputError(
-                f"{ADDED.place(name)} fails: {type(error).__name__}: {error}"
-            ) from error
+            raise InputError(f"{place} fails: {type(error).__name__}: {error}") from error
         n, failed = rollout.shape[0], np.asarray(rollout.status) != 0
         if values.shape != (n,):
             raise InputError(
-                f"{ADDED.place(name)} must return {n} numbers, one for each scenario, got an array "
+                f"{place} must return {n} numbers, one for each scenario, got an array "
                 f"of the shape {values.shape}"
             )
         # NaN means a failed row to every reader: one that is missing, or one too many, would pass
         # for it.
         if bad := np.flatnonzero(np.isnan(values) != failed).size:
             raise InputError(
-                f"{ADDED.place(name)} must be NaN exactly where a scenario failed; it is otherwise "
+                f"{place} must be NaN exactly where a scenario failed; it is otherwise "
                 f"in {bad} of {n}"
             )
         return values
@@ -103,6 +109,68 @@ def _checked(found: object, name: str) -> Metric:
 METRICS: Mapping[str, Metric] = Registry(_OURS, ADDED, _checked)
 """Metrics by name: those of the paper's Table I, then ours beyond it, then those of installed
 packages."""
+
+_NAMED: set[str] = set()
+"""Names of the metrics that were read from files and modules of the user."""
+
+
+def read(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of metrics; those of the user's own are imported, and known from then on.
+
+    Args:
+        names: of metrics; or where one of the user's own is, ``file.py:METRIC`` or
+            ``module:METRIC``. Only what a person has typed may be given, never what a folder says.
+
+    Raises:
+        InputError: one cannot be imported, is no metric, or has the name of another one.
+    """
+    found: dict[str, str] = {}
+    for name in names:
+        if not is_own(name):
+            found.setdefault(name, name)
+            continue
+        metric = object_of(name, "--metrics", Metric, "Metric")
+        if metric.name in found or (metric.name in METRICS and metric.name not in _NAMED):
+            raise InputError(
+                f"the metric '{name}' has the name '{metric.name}', which another one has"
+            )
+        _NAMED.add(metric.name)
+        _OURS[metric.name] = _with_checks(metric, f"metric '{name}'")
+        found[metric.name] = name
+    return tuple(found)
+
+
+def about(spec: str) -> dict[str, str | float]:
+    """Return what a run records of a metric of the user's own, which was read, but its code."""
+    (name,) = read([spec])
+    path, metric = file_of(spec), METRICS[name]
+    digest = hashlib.sha256(path.read_bytes()).hexdigest() if path else ""
+    facts = ("name", "unit", "description", "sense", "cap")
+    return {"code": spec, "sha256": digest} | {fact: getattr(metric, fact) for fact in facts}
+
+
+def stand_in(about: Mapping[str, Any]) -> None:
+    """Make a recorded metric of somebody's own known without its code, so that it cannot compute.
+
+    Raises:
+        ValueError: what was recorded of it is damaged.
+    """
+    name, code = about.get("name"), about.get("code")
+
+    def compute(rollout: Rollout) -> Float:
+        raise InputError(
+            f"the metric '{name}' is code ({code}), which this command does not import; a package "
+            "that declares it as an entry point is"
+        )
+
+    facts = {fact: about.get(fact) for fact in ("name", "unit", "description")}
+    if not all(isinstance(fact, str) for fact in facts.values()):
+        raise ValueError("name, unit and description of an own metric must be texts")
+    if name not in METRICS:
+        cap = float(about.get("cap", math.nan))
+        _OURS[str(name)] = Metric(**facts, sense=about.get("sense"), cap=cap, compute=compute)  # type: ignore[arg-type]
+        _NAMED.add(str(name))
+
 
 TABLE_I = tuple(metric.name for metric in _TABLE_I)
 """Names of the paper's eleven metrics, which every run records as far as its rollouts allow."""

@@ -17,7 +17,9 @@ from bridgegen.drivers.remote.messages import (
     RAISED,
     Message,
     ProtocolError,
+    is_json,
     pack,
+    pack_json,
     unpack,
 )
 from bridgegen.drivers.remote.wire import ClosedError, Wire, connected
@@ -195,7 +197,9 @@ def exchange(wire: Wire, message: Message, seconds: float, error: type[CallError
         ProtocolError: what came is no message.
     """
     try:
-        answer = unpack(wire.ask(pack(message), seconds), MAX_ITEMS)
+        data = wire.ask((pack_json if wire.is_json else pack)(message), seconds)
+        wire.is_json = is_json(data)
+        answer = unpack(data, MAX_ITEMS)
         # One answer to one message: else each answer from here on would be the one before.
         if wire.has_more:
             raise ProtocolError("more than one message came as an answer")

@@ -55,6 +55,7 @@ class Wire:
         self._readable.register(reads, select.POLLIN)
         self._writable.register(writes, select.POLLOUT)
         self._ahead = bytearray()
+        self.is_json = False  # whether the other end has answered in JSON
 
     @property
     def is_open(self) -> bool:

@@ -111,7 +111,7 @@ class PipelineOptions(Declared):
         metadata=option(
             NAMES,
             "Metrics to record besides the objective's and the paper's, see 'bridgegen list "
-            "metrics'.",
+            "metrics'; or your own: file.py:METRIC.",
             hint="Separated by commas.",
             before=(),
             group=OUTPUT,

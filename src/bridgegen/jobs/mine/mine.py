@@ -1,7 +1,7 @@
 """``bridgegen mine``: read recordings, clean and place them, find near misses, account for all."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,9 @@ from bridgegen import drivers as egos
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError, InputError, StorageError
 from bridgegen.engine.options import called_with, range_problems
-from bridgegen.jobs.frame import Judged, Table
+from bridgegen.jobs.frame import Judged, Table, command_of
 from bridgegen.jobs.mine.options import MineOptions
+from bridgegen.pages.templates import counted
 from bridgegen.recordings.conflicts.find import RecordedConflict, conflicts_of, order
 from bridgegen.recordings.events.find import FoundEvents, find_events
 from bridgegen.recordings.events.of_scenarios import (
@@ -26,7 +27,8 @@ from bridgegen.recordings.events.tables import write_events
 from bridgegen.recordings.excerpt import Clock, clock_of
 from bridgegen.recordings.lanes.account import LanesFound, account_of
 from bridgegen.recordings.lanes.find import Located, locate, read_map
-from bridgegen.recordings.readers.clean import Cleaned, clean
+from bridgegen.recordings.readers.clean import Cleaned, check_time_step, clean
+from bridgegen.recordings.readers.format import read_head
 from bridgegen.recordings.readers.formats import files_of, read
 from bridgegen.recordings.readers.quality import Finding
 from bridgegen.recordings.readers.table import Facts, RecordedTraffic, kind_in_words
@@ -66,6 +68,7 @@ class Summary:
         events: in it.
         conflicts: near misses, then contacts, the most harmful first.
         names: of the participants in them, by number.
+        kinds: theirs, likewise.
     """
 
     facts: Facts
@@ -83,6 +86,7 @@ class Summary:
     events: FoundEvents
     conflicts: tuple[RecordedConflict, ...]
     names: dict[int, str]
+    kinds: dict[int, str]
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ class Mined:
 
     Attributes:
         recordings: in the order of the files.
-        skipped: with ``lenient``: files left out, or what of them could not be read, and why.
+        skipped: files left out, or what of them could not be read, and why.
         others: files of folders that are no recordings.
         time_step: after cleaning [s].
         out: the folder.
@@ -101,6 +105,7 @@ class Mined:
         scenarios: the events that are a scenario, per scenario.
         mined: what was made of each of these.
         updates: ranges proposed for scenario files.
+        command: that does it again with a driver in the ego's place; "" where it was given one.
     """
 
     recordings: tuple[Summary, ...]
@@ -114,11 +119,20 @@ class Mined:
     scenarios: tuple[ScenarioEvents, ...] = ()
     mined: tuple[MinedScenario | Unmade, ...] = ()
     updates: tuple[Update, ...] = ()
+    command: str = ""
 
     @property
     def work(self) -> str:
         """How much was read."""
         return f"{sum(recording.states for recording in self.recordings):,} states"
+
+    @property
+    def unread(self) -> list[str]:
+        """Why each file was not read, or not to its end: a line each."""
+        return [
+            first + (f" (and {counted(len(more), 'problem')} more)" if more else "")
+            for _, (first, *more) in self.skipped
+        ]
 
     def to_json(self) -> Any:
         """Return what was recorded, found and written as JSON's types."""
@@ -175,7 +189,7 @@ def mine(given: MineOptions) -> Mined:
         What was recorded, and what was left out.
 
     Raises:
-        FileFormatError: a file that is no recording, or breaks its format's rules.
+        FileFormatError: no file of `recordings` can be read, or one of the names is of nothing.
         InputError: no recordings, a time step or a number out of range, a map of another place, or
             a scenario that declares no events.
         UnknownNameError: no such driver.
@@ -191,6 +205,7 @@ def mine(given: MineOptions) -> Mined:
     out = Path(given.out or "mined")
     update, scenarios = _paths(given.update), _paths(given.scenarios)
     time_step = given.time_step
+    check_time_step(time_step)
     # What can be refused is refused before the first recording is read, which may take long.
     _refuse_replaced([*update, *scenarios], out / MINED)
     refuse_same_names(update)
@@ -205,31 +220,20 @@ def mine(given: MineOptions) -> Mined:
     counts: Counter[str] = Counter()
     for number, file in enumerate(files):
         given.callbacks.progress("files", number, len(files), "")
-        try:
-            for traffic in read(file):
-                cleaned = clean(traffic, time_step)
-                located = locate(cleaned.traffic, on_map)
-                conflicts = conflicts_of(cleaned.traffic)
-                summary = summarise(traffic, cleaned, located, conflicts)
-                found.append(summary)
-                clock = clock_of(cleaned.traffic)
-                # Of each recording only the closest events are kept, with an excerpt: its traffic
-                # is not.
-                played = closest(played, cleaned.traffic, clock, summary.events, counts)
-                counts.update({each.kind.name: len(each) for each in summary.events.kinds})
-                kept = _most_critical(kept, cleaned.traffic, clock, conflicts, given.keep)
-        except FileFormatError as error:
-            if not given.lenient:
-                if len(files) == 1:
-                    raise
-                raise FileFormatError(
-                    *error.problems,
-                    "--lenient leaves out files that cannot be read, and lists them",
-                ) from None
-            skipped.append((file, error.problems))
+        for traffic, cleaned in _readable(file, time_step, skipped):
+            located = locate(cleaned.traffic, on_map)
+            conflicts = conflicts_of(cleaned.traffic)
+            summary = summarise(traffic, cleaned, located, conflicts)
+            found.append(summary)
+            clock = clock_of(cleaned.traffic)
+            # Of each recording only the closest events are kept, with an excerpt: its traffic
+            # is not.
+            played = closest(played, cleaned.traffic, clock, summary.events, counts)
+            counts.update({each.kind.name: len(each) for each in summary.events.kinds})
+            kept = _most_critical(kept, cleaned.traffic, clock, conflicts, given.keep)
     if not found:
         problems = [text for _, texts in skipped for text in texts]
-        raise FileFormatError(*problems, "no recording could be read")
+        raise FileFormatError(*problems, *["no recording could be read"] * (len(files) > 1))
     replays = _written(kept, out / CRITICAL, given.ego)
     warnings = on_map.warnings if on_map is not None else ()
     events = [item.events for item in found]
@@ -256,11 +260,24 @@ def mine(given: MineOptions) -> Mined:
         met,
         made,
         updates,
+        "" if given.ego else command_of("mine", given, out, ego="reference"),
     )
     write_all(mined)
     for text in warnings_of(mined):
         given.callbacks.say(f"bridgegen: {text}")
     return mined
+
+
+def _readable(
+    file: Path, time_step: float, skipped: list[tuple[Path, tuple[str, ...]]]
+) -> Iterator[tuple[RecordedTraffic, Cleaned]]:
+    """Yield the recordings in a file, cleaned, and note why it cannot be read to its end."""
+    try:
+        for traffic in read(file):
+            yield traffic, clean(traffic, time_step)
+    # Also what a format needs and is not installed, or not supported: the other files are read.
+    except InputError as error:
+        skipped.append((file, error.problems))
 
 
 def _paths(given: Any) -> list[Path]:
@@ -306,6 +323,8 @@ def _written(kept: list[Prepared], folder: Path, ego: str | None) -> tuple[Repla
 def _files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     files, others = [], []
     for path in paths:
+        if not path.exists():
+            read_head(path)  # says why not: a mistyped name is no broken file
         recordings, beside = files_of(path)
         files += recordings
         others += beside
@@ -324,6 +343,7 @@ def summarise(
     """Return what a recording holds, and where."""
     after = cleaned.traffic
     kinds = Counter(kind_in_words(kind) for kind in cleaned.kinds.tolist())
+    met = {p for conflict in conflicts for p in (conflict.ego, conflict.other)}
     shown = np.linspace(0, len(after.names) - 1, min(PATHS_SHOWN, len(after.names))).astype(int)
     paths = []
     for p in np.unique(shown).tolist():
@@ -347,5 +367,6 @@ def summarise(
         lanes=lanes,
         events=find_events(after, located),
         conflicts=conflicts,
-        names={p: after.names[p] for conflict in conflicts for p in (conflict.ego, conflict.other)},
+        names={p: after.names[p] for p in met},
+        kinds={p: kind_in_words(int(after.kind[p])) for p in met},
     )

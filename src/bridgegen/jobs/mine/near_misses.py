@@ -1,12 +1,14 @@
 """Near misses on the page of recordings, and as a table."""
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
+from shlex import quote
 
 from bridgegen.base.units import percent
 from bridgegen.jobs.mine.mine import CRITICAL, Mined, Summary
-from bridgegen.pages.moving import moving_picture
+from bridgegen.pages.moving import SMALL, moving_picture
 from bridgegen.pages.templates import counted
-from bridgegen.recordings.conflicts.find import RecordedConflict
+from bridgegen.recordings.conflicts.find import RecordedConflict, order
 from bridgegen.recordings.replays.write import Replay
 
 HEAD = (
@@ -16,6 +18,10 @@ HEAD = (
 )  # fmt: skip
 TRUSTED = 0.02
 """Share of vehicles whose boxes touch another's up to which a recording's near misses count."""
+PLAYED = 12
+"""Number of events that play on the page."""
+LISTED = 20
+"""Number of further ones in its table."""
 
 
 def rows(mined: Mined) -> Iterator[list[object]]:
@@ -62,15 +68,18 @@ def in_words(summary: Summary) -> str:
     return text
 
 
-def shown(replay: Replay) -> dict[str, object]:
-    """Return what the page shows of an event that is written."""
+def gallery(mined: Mined) -> list[dict[str, object]]:
+    """Return what the page plays: the most severe events that are written."""
+    return [_shown(mined, replay) for replay in mined.replays[:PLAYED]]
+
+
+def _shown(mined: Mined, replay: Replay) -> dict[str, object]:
     event, found = replay.event, replay.event.event.found
-    ego, other = event.names
     paths = (replay.scenario.with_suffix(end) for end in (".xosc", ".xodr", ".owl"))
+    summary = _of(mined, event.event)
+    text = f"The{sentence(summary, event.event, mined.time_step)[3:]}."
     facts = [
-        f"the ego is {ego}, the other {other}, of {event.recording}",
-        f"responsible: {found.responsible or 'unknown'}; {found.type}",
-        f"time to collision {found.ttc:.2f} s, {found.needed_deceleration:.1f} m/s² needed",
+        found.sentence,
         f"not simulated: {replay.problem}"
         if replay.problem
         else f"simulated here, all participants are within {max(replay.off, 0.001):.3f} m of where "
@@ -78,11 +87,65 @@ def shown(replay: Replay) -> dict[str, object]:
     ]
     return {
         "id": replay.scenario.stem,
-        "sentence": found.sentence,
-        "picture": moving_picture(event.motion, 1, event.when, found.sentence),
-        "facts": [*facts, f"doubtful: {event.event.doubt}"] if event.event.doubt else facts,
+        "tag": "boxes touch" if event.event.is_contact else "near miss",
+        "is_contact": event.event.is_contact,
+        "doubt": event.event.doubt,
+        "sentence": text,
+        "picture": moving_picture(
+            event.motion, 1, event.when, text, size=SMALL, lines=summary.lanes.borders
+        ),
+        "command": f"bridgegen simulate {quote(str(replay.scenario))}",
+        "facts": facts,
         "files": [(f"{CRITICAL}/{path.name}", path.name) for path in paths if path.exists()],
     }
+
+
+def _of(mined: Mined, event: RecordedConflict) -> Summary:
+    """Return the recording that an event is in."""
+    return next(
+        recording
+        for recording in mined.recordings
+        if any(each is event for each in recording.conflicts)
+    )
+
+
+def sentence(summary: Summary, event: RecordedConflict, time_step: float) -> str:
+    """Return who met whom, how, how near, when, and in which file."""
+    found = event.found
+    ego, other = (f"{summary.kinds[p]} {summary.names[p]}" for p in (event.ego, event.other))
+    how = f" ({found.type})" if found.type else ""
+    near = (
+        f"touched the {other}{how} at {found.closing_normal:.1f} m/s closing speed"
+        if event.is_contact
+        else f"came within {found.ttc:.2f} s of the {other}{how} and needed "
+        f"{found.needed_deceleration:.1f} m/s² to stop short"
+    )
+    where = Path(summary.facts.source).name
+    return f"the {ego} {near}, {event.instant * time_step:.1f} s into {where}"
+
+
+def ranked(mined: Mined) -> list[tuple[Summary, RecordedConflict]]:
+    """Return the conflicts of all recordings, the most severe first, as they are written."""
+    every = [(each, one) for each in mined.recordings for one in each.conflicts]
+    return sorted(every, key=lambda pair: order(pair[1]))
+
+
+def other_rows(mined: Mined) -> list[list[object]]:
+    """Return the page's table of those that are not played, the most severe first."""
+    played = {id(item.event.event) for item in mined.replays[:PLAYED]}
+    return [
+        [
+            ("boxes touch" if event.is_contact else "near miss", event.doubt),
+            f"{summary.names[event.ego]} and {summary.names[event.other]}",
+            event.found.type,
+            f"{event.found.ttc:.2f} s",
+            f"{event.found.needed_deceleration:.1f} m/s²",
+            f"{event.instant * mined.time_step:.1f} s",
+            Path(summary.facts.source).name,
+        ]
+        for summary, event in ranked(mined)
+        if id(event) not in played
+    ]
 
 
 def screen_rows(mined: Mined) -> Iterator[tuple[str, str, str, str, float, float, str]]:
@@ -116,5 +179,5 @@ def _as_json(summary: Summary, each: RecordedConflict, time_step: float) -> dict
 
 
 def recordings_in_words(mined: Mined) -> Sequence[tuple[str, str]]:
-    """Return each recording's name and its conflicts in words."""
-    return [(recording.facts.name, in_words(recording)) for recording in mined.recordings]
+    """Return the names of the recordings with conflicts, each with these in words."""
+    return [(each.facts.name, in_words(each)) for each in mined.recordings if each.conflicts]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bridgegen.engine.options.forms import FLAG, NUMBER, PATH, TEXT, WHOLE
+from bridgegen.engine.options.forms import NUMBER, PATH, TEXT, WHOLE
 from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT, option
 from bridgegen.jobs.frame import PATHS, Job, JobOptions
 from bridgegen.recordings import TIME_STEP
@@ -32,10 +32,6 @@ class MineOptions(JobOptions):
             shown="the lanes that come with the recording, or inferred from its paths",
             group=WHAT,
         ),
-    )
-    lenient: bool = field(
-        default=False,
-        metadata=option(FLAG, "Skip files that cannot be read, and list them.", group=WHAT),
     )
     time_step: float = field(
         default=TIME_STEP,
@@ -99,6 +95,7 @@ JOB = Job(
     Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
     Lanes are those of the map, or of the recording, or inferred from its paths. Near misses are
     found as in a search; the most critical ones become OpenSCENARIO files that replay them.
+    Files that cannot be read are left out and listed.
     The format is detected from the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
     CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
     Finds events (cut-in, cut-out, lead-brakes, approach, following, lane-change)

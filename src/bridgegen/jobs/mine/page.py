@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from bridgegen.drivers.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
 from bridgegen.jobs.mine import near_misses as conflicts
 from bridgegen.jobs.mine.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
 from bridgegen.pages import charts, exposure, templates
-from bridgegen.pages.moving import moving_picture
+from bridgegen.pages.moving import SMALL, moving_picture
 from bridgegen.pages.templates import counted
 from bridgegen.recordings.cells import cell
 from bridgegen.recordings.events.playback import SHOWN, caption
@@ -116,7 +117,7 @@ def write_all(mined: Mined) -> None:
     templates.write_page(
         mined.out / PAGE,
         "jobs/mine/page.html",
-        title="What was recorded",
+        title="Near misses in recorded traffic",
         generator=GENERATOR,
         facts=[*_facts(mined)],
         verdict=_banner(mined),
@@ -126,7 +127,7 @@ def write_all(mined: Mined) -> None:
             kind: [
                 (
                     event.name,
-                    moving_picture(event.motion, 1, event.when, caption(event)),
+                    moving_picture(event.motion, 1, event.when, caption(event), size=SMALL),
                     caption(event),
                 )
                 for event in mined.played
@@ -144,14 +145,15 @@ def write_all(mined: Mined) -> None:
         files=[*zip(ENDINGS, _LINKS, strict=True)],
         folder=SCENARIOS,
         conflicts=_grouped(conflicts.recordings_in_words(mined)),
-        near_misses=map(conflicts.shown, mined.replays),
-        left_out=[
-            *(text for _, texts in mined.skipped for text in texts),
-            *(f"{path}: no recording" for path in mined.others),
-        ],
+        near_misses=conflicts.gallery(mined),
+        more=conflicts.other_rows(mined),
+        listed=conflicts.LISTED,
+        step=f"{mined.time_step:g}",
+        skipped=mined.unread,
+        others=[f"{path}: no recording" for path in mined.others],
     )
     for scenario in mined.mined:
-        if isinstance(scenario, MinedScenario):
+        if isinstance(scenario, MinedScenario) and scenario.fit is not None:
             exposure.write_page(
                 mined.out / SCENARIOS / f"{scenario.name}{ENDINGS[1]}", scenario.fit
             )
@@ -210,16 +212,26 @@ def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[byte
 
 
 def _banner(mined: Mined) -> templates.Banner:
-    near = sum(
-        not each.is_contact for recording in mined.recordings for each in recording.conflicts
-    )
-    text = f"{counted(near, 'near miss')} in {counted(len(mined.recordings), 'recording')}"
-    doubtful = [item for item in mined.replays if item.event.event.doubt]
-    if mined.replays:
-        text += f"; {counted(len(mined.replays), 'scenario')} written"
+    found = conflicts.ranked(mined)
+    sure = sum(not event.is_contact and not event.doubt for _, event in found)
+    doubtful = sum(not event.is_contact and event.doubt != "" for _, event in found)
+    touching = len(found) - sure - doubtful
+    text = f"in {counted(len(mined.recordings), 'recording')}"
     if doubtful:
-        text += f", {len(doubtful):,} of them doubtful"
-    return templates.Banner(f"{text}.")
+        text += f"; {doubtful:,} more with motion that could not happen"
+    if touching:
+        text += f"; boxes of {counted(touching, 'pair')} touch"
+    text += "."
+    if found:
+        text += f" The most severe: {conflicts.sentence(*found[0], mined.time_step)}."
+    command = mined.command if mined.replays else ""
+    if command:
+        text += " Next, with a driver in the ego's place:"
+    elif mined.replays:
+        text += " Next, simulated with its driver:"
+        command = f"bridgegen simulate {shlex.quote(str(mined.replays[0].scenario))}"
+    word = counted(sure, "near miss") if sure else "no near miss"
+    return templates.Banner(text, word=word.upper(), command=command)
 
 
 def _facts(mined: Mined) -> Iterator[str]:
@@ -228,11 +240,20 @@ def _facts(mined: Mined) -> Iterator[str]:
         f"{sum(sum(recording.participants.values()) for recording in mined.recordings):,} "
         "participants"
     )
-    yield f"{sum(recording.hours for recording in mined.recordings):.4g} h"
-    yield f"{sum(recording.kilometres for recording in mined.recordings):.4g} km"
-    yield f"cleaned at {mined.time_step:g} s"
+    yield _driven(sum(recording.hours for recording in mined.recordings))
+    yield f"{sum(recording.kilometres for recording in mined.recordings):,.3g} km"
+    if mined.replays:
+        yield f"{counted(len(mined.replays), 'scenario')} written"
     if mined.skipped:
-        yield f"{counted(len(mined.skipped), 'file')} skipped"
+        yield f"{counted(len(mined.skipped), 'file')} not read"
+
+
+def _driven(hours: float) -> str:
+    """Return a duration in the unit in which it is read at a glance."""
+    seconds = 3600.0 * hours
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{hours:,.4g} h"
 
 
 def _grouped(pairs: Iterable[tuple[str, str]]) -> list[str]:
@@ -245,28 +266,26 @@ def _grouped(pairs: Iterable[tuple[str, str]]) -> list[str]:
 
 def _recordings(mined: Mined) -> dict[str, object]:
     """Return the table of recordings, and what is shown of each."""
-    kinds = [
-        name
-        for name in NAMES
-        if any(name in recording.participants for recording in mined.recordings)
-    ]
-    rows = [
-        [
-            recording.facts.name,
-            recording.facts.format,
-            f"{recording.facts.time_step:.4g} s",
-            f"{recording.duration:.4g} s",
-            *(recording.participants.get(kind, 0) for kind in kinds),
-            f"{recording.hours:.4g}",
-            f"{recording.kilometres:.4g}",
-        ]
-        for recording in mined.recordings
-    ]
     return {
-        "kinds": kinds,
-        "rows": rows,
+        "rows": [_recording_row(recording) for recording in mined.recordings],
         "recordings": [_recording(recording, mined.time_step) for recording in mined.recordings],
     }
+
+
+def _recording_row(summary: Summary) -> list[object]:
+    contacts = sum(each.is_contact for each in summary.conflicts)
+    source = Path(summary.facts.source).name
+    return [
+        (source, "" if Path(source).stem == summary.facts.name else summary.facts.name),
+        ", ".join(f"{count:,} {kind}" for kind, count in summary.participants.items()),
+        f"{summary.duration:.3g} s",
+        _driven(summary.hours),
+        f"{summary.kilometres:.3g} km",
+        len(summary.conflicts) - contacts,
+        contacts,
+        sum(len(kind) for kind in summary.events.kinds),
+        "–" if math.isnan(summary.lanes.vehicle_share) else percent(summary.lanes.vehicle_share),
+    ]
 
 
 def _events(mined: Mined) -> dict[str, object]:

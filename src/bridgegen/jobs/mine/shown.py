@@ -10,11 +10,13 @@ from bridgegen.base.units import percent
 from bridgegen.jobs.frame import Table
 from bridgegen.jobs.mine.mine import Mined, Summary
 from bridgegen.jobs.mine.near_misses import conflicts_as_json, recordings_in_words, screen_rows
+from bridgegen.pages.templates import counted, joined
 from bridgegen.recordings.events.of_scenarios import encounters_of
 from bridgegen.recordings.events.tables import against_in_words, kind_rows, rates_in_words
 from bridgegen.recordings.scenarios.files import FOLDER as SCENARIOS
 from bridgegen.recordings.scenarios.files import made_as_json, made_row
 from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade
+from bridgegen.recordings.scenarios.ranges import held_in_words
 from bridgegen.recordings.scenarios.update import ENDING as DIFF
 from bridgegen.recordings.scenarios.update import in_words
 from bridgegen.scenario.exposure.exposure import Encounters
@@ -31,9 +33,10 @@ def warnings_of(mined: Mined) -> list[str]:
         if recording.lanes.source == "map"
         for note in recording.lanes.notes
     ]
-    found = [f"warning: skipped: {text}" for _, texts in mined.skipped for text in texts]
+    found = [f"warning: not read: {text}" for text in mined.unread]
     if mined.others:
-        found.append(f"note: {len(mined.others)} files are no recordings")
+        names = joined([path.name for path in mined.others])
+        found.append(f"note: {counted(len(mined.others), 'file')} without recording: {names}")
     return [*found, *(f"warning: {text}" for text in (*mined.warnings, *notes))]
 
 
@@ -54,7 +57,10 @@ def json_of(mined: Mined) -> dict[str, Any]:
             }
             for replay in mined.replays
         ],
-        "skipped": [str(path) for path, _ in mined.skipped],
+        "skipped": [
+            {"file": str(path), "reason": reason}
+            for (path, _), reason in zip(mined.skipped, mined.unread, strict=True)
+        ],
         "others": [str(path) for path in mined.others],
         **_events(mined),
         "mined": [made_as_json(scenario, mined.out) for scenario in mined.mined],
@@ -90,8 +96,11 @@ def shown_of(mined: Mined) -> Iterator[str | Table]:
     else:
         yield "quality: nothing to clean"
     yield ""
-    for name, text in recordings_in_words(mined):
+    conflicts = recordings_in_words(mined)
+    for name, text in conflicts:
         yield f"{name}: {text}"
+    if none := len(mined.recordings) - len(conflicts):
+        yield f"{counted(none, 'recording')} without near miss"
     if mined.replays:
         yield ""
         of_events = (
@@ -116,12 +125,15 @@ def shown_of(mined: Mined) -> Iterator[str | Table]:
         yield ""
         of_made = ("mined scenario", "events", "per hour (95 %)", "parameters beyond the source's")
         yield Table(of_made, [made_row(scenario) for scenario in made])
+        for scenario in made:
+            if scenario.fit is None:
+                yield f"{scenario.name}: {held_in_words(scenario.events)}; no distribution"
     tables = ("recordings", "lanes", "quality", "events", "conflicts")
     yield f"\n{'page':<12}{mined.out / 'recordings.html'}"
     yield f"{'tables':<12}{', '.join(str(mined.out / f'{name}.csv') for name in tables)}"
     yield f"{'events':<12}{mined.out / 'events'}, a table per scenario"
     if made:
-        yield f"{'mined':<12}{mined.out / SCENARIOS}, a scenario, its fit and its distribution each"
+        yield f"{'mined':<12}{mined.out / SCENARIOS}, a scenario each, its fit and its distribution"
     for update in mined.updates:
         yield ""
         for text in in_words(update):

@@ -14,7 +14,11 @@ from bridgegen.scenario.exposure.exposure import Rate
 
 
 def sentence(risk: Risk) -> str:
-    """Return what a risk says, in one or two sentences."""
+    """Return what a risk says, in one or two sentences, and what of its exposure is a prior."""
+    return " ".join(filter(None, [_sentence(risk), risk.exposure.weighed]))
+
+
+def _sentence(risk: Risk) -> str:
     p, what = risk.probability(risk.event), WORDS[risk.event]
     if risk.count == "ego":
         what = f"{what} that the ego is responsible for or could have prevented"

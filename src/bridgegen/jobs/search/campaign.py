@@ -4,15 +4,17 @@ import hashlib
 import itertools
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from bridgegen.assess.metrics import about
 from bridgegen.base.arrays import Int
 from bridgegen.base.errors import InputError, Interrupted, StorageError, WorkersError
+from bridgegen.base.plugins import file_of, is_own
 from bridgegen.drivers import STORYBOARD
 from bridgegen.engine.domain import outside
 from bridgegen.engine.options import SearchOptions, called_with, checked, range_problems
@@ -204,6 +206,7 @@ def run_search(given: SearchArguments) -> Run:
             adversary=driven,
             optimised=chosen.to_dict(),
             criteria=[criterion.to_dict() for criterion in pipeline.monitor],
+            own_metrics=[about(name) for name in given.metrics if is_own(name)],
         )
         # Before the folder is made, so that a refused call leaves none.
         searcher = searcher_of(pipeline, made_with, callbacks.warning)  # it may refuse
@@ -227,6 +230,7 @@ def resume(
     ego: str | None = None,
     worse_than: str | None = None,
     algorithm: str | None = None,
+    metrics: Sequence[str] | None = None,
     simulator: SimulatorChoice | None = None,
     deliver: bool = True,
     workers: Choice = None,
@@ -242,6 +246,7 @@ def resume(
             imported unasked.
         worse_than: likewise, the driver that the ego's is compared with.
         algorithm: likewise, an algorithm of your own.
+        metrics: likewise, those of your own.
         simulator: the run's, or its screen, with its place on this machine; as recorded by
             default.
         deliver: as for ``run_search``.
@@ -267,11 +272,18 @@ def resume(
             "resume",
             ego=ego,
             worse_than=worse_than,
+            metrics=metrics or (),
             compares=True,
             causes=True,
             simulator=simulator,
             workers=pool,
         )
+        for known in run.settings.own_metrics:
+            if known["sha256"] != about(str(known["code"]))["sha256"]:
+                callbacks.warning(
+                    f"{file_of(str(known['code']))} has changed since the run began: evaluations "
+                    f"from here on have another '{known['name']}' than those before"
+                )
         callbacks.stage("compile")
         pipeline.warm_up()
         settings = run.settings

@@ -73,6 +73,7 @@ def confirm(
     rows: int | None = None,
     again: bool = False,
     ego: str | None = None,
+    metrics: Sequence[str] | None = None,
     workers: Choice = None,
     stage: Callable[[str], None] | None = None,
     progress: Callable[[int, int, Tally], None] | None = None,
@@ -89,6 +90,7 @@ def confirm(
             ones by default.
         again: whether to discard earlier results.
         ego: where a driver of your own drives, that same driver.
+        metrics: likewise, those of your own.
         workers: run the other simulator, see ``run_search``.
         stage: called as a stage begins: "compile", "confirm", "report".
         progress: called with the number of scenarios done, of all, and the numbers of confirmed
@@ -117,11 +119,12 @@ def confirm(
     names = {exported.evaluation: exported.name for exported in run.exported(len(every))}
     asked = _chosen(place, every, names, rows, settings.budget)
     command = f"confirm --simulator {simulator.name}"
-    here = pipeline_of(run, command, ego=ego)
+    own = metrics or ()
+    here = pipeline_of(run, command, ego=ego, metrics=own)
     stage("compile")
     here.warm_up()
     with open_workers(workers) as pool:
-        there = pipeline_of(run, command, ego=ego, elsewhere=simulator, workers=pool)
+        there = pipeline_of(run, command, ego=ego, metrics=own, elsewhere=simulator, workers=pool)
         empty = _empty(here, there, simulator, run)
         known = {} if again else _known(place, empty, every)
         todo = [k for k in asked if k not in known or known[k].there is None]

@@ -1,7 +1,7 @@
 """The critical regions of a run on disk, verified with its own scenario, ego and objective."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,7 @@ def regions_of(
     *,
     ego: str | None = None,
     worse_than: str | None = None,
+    metrics: Sequence[str] | None = None,
     simulator: SimulatorChoice | None = None,
     samples: int = SAMPLES,
     at_least: float = AT_LEAST,
@@ -75,6 +76,7 @@ def regions_of(
         folder: of the run.
         ego: where a driver of your own drives, that same driver.
         worse_than: likewise, the driver that the ego's is compared with.
+        metrics: likewise, those of your own.
         simulator: the run's, with its place on this machine; as recorded by default.
         samples: fresh scenarios to simulate in each region.
         at_least: the share of critical scenarios that makes a region critical.
@@ -103,6 +105,7 @@ def regions_of(
             "analyse regions",
             ego=ego,
             worse_than=worse_than,
+            metrics=metrics or (),
             compares=True,
             simulator=simulator,
             workers=pool,

@@ -2,9 +2,11 @@
 
 import hashlib
 import shlex
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from bridgegen.assess.metrics import stand_in
 from bridgegen.assess.objective import Objective
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.base.plugins import is_own
@@ -30,6 +32,7 @@ def pipeline_of(
     *,
     ego: str | None = None,
     worse_than: str | None = None,
+    metrics: Sequence[str] | None = None,
     compares: bool = False,
     causes: bool = False,
     simulator: SimulatorChoice | None = None,
@@ -43,6 +46,7 @@ def pipeline_of(
         command: the BridgeGen command that asks, for messages.
         ego: where a driver of the user's drives, that same driver.
         worse_than: likewise, the driver that the ego's was compared with.
+        metrics: likewise, the metrics of the user's own; None where none is to be computed.
         compares: whether rows are evaluated; else a baseline that is a driver of the user's, and is
             not named, is left out.
         causes: whether to determine causes as the run did; where only one cause counts, they are
@@ -70,6 +74,7 @@ def pipeline_of(
         else:
             # No row is evaluated, so nothing asks the other driver: its code need not be imported.
             settings = replace(settings, worse_than=None)
+    settings = _with_metrics(settings, metrics, folder, command)
     scenario, space, roads = searched(run)
     pipeline = Pipeline(
         scenario,
@@ -86,6 +91,37 @@ def pipeline_of(
     )
     pipeline.choose_objective(Objective.from_dict(settings.optimised))
     return pipeline
+
+
+def _with_metrics(
+    settings: Settings, given: Sequence[str] | None, folder: Path, command: str
+) -> Settings:
+    """Return settings with the metrics to import: those of the user's own that are named again.
+
+    Raises:
+        InputError: they must be named, or are others than the run's.
+        StorageError: what is recorded of one is damaged.
+    """
+    own = tuple(name for name in settings.metrics if is_own(name))
+    if given is not None:
+        if own and not given:
+            names = shlex.quote(",".join(own))
+            raise InputError(
+                f"{folder}: its metrics {', '.join(own)} are code; to run them, name them: "
+                f"bridgegen {command} {folder} --metrics {names}"
+            )
+        if tuple(name for name in given if is_own(name)) != own:
+            raise InputError(
+                f"{folder}: the metrics of one's own of this run (--metrics) must be "
+                f"{', '.join(own) or 'none'}, got {', '.join(given)}"
+            )
+        return settings
+    for known in settings.own_metrics:
+        try:
+            stand_in(known)
+        except ValueError as error:
+            raise StorageError(f"{folder}: the run's settings are damaged: {error}") from None
+    return replace(settings, metrics=tuple(name for name in settings.metrics if name not in own))
 
 
 def _ego(settings: Settings) -> str | None:

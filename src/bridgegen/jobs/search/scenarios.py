@@ -6,6 +6,7 @@ from typing import Any, NoReturn, cast, get_args
 
 from bridgegen.assess.conflict.harm import Count
 from bridgegen.assess.conflict.quantities import HARM, QUANTITIES
+from bridgegen.assess.metrics import read
 from bridgegen.assess.objective import RULES, Objectives
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.engine.options import CommonOptions
@@ -208,6 +209,7 @@ def chosen_objective(
         InputError: weights that nothing uses; ``paper`` among other metrics.
         UnknownNameError: no such metric, or choice of whose conflicts count.
     """
+    read(options.metrics)  # those of the user's own may be its terms
     metrics, weights, scale = options.objective, options.weights, options.scale
     count = counted(options.count)
     for name in metrics or ():

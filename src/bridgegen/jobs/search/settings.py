@@ -1,7 +1,7 @@
 """The settings of a run: all that repeating it needs, as JSON in its store."""
 
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self, get_type_hints
@@ -59,6 +59,7 @@ class Settings(SearchOptions):
         fingerprint: digest of the scenario and its distribution when the run began.
         map_digest: SHA-256 of the map's file, where there is one.
         optimised: the objective with its weights, as ``Objective.to_dict`` gives it.
+        own_metrics: what is known of the metrics of the user's own, but their code.
     """
 
     budget: int
@@ -68,10 +69,13 @@ class Settings(SearchOptions):
     fingerprint: str
     map_digest: str | None
     optimised: Mapping[str, Any]
+    own_metrics: Sequence[Mapping[str, str | float]] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON's types."""
         plain = {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
+        if not self.own_metrics:
+            del plain["own_metrics"]  # as in runs of earlier versions
         chosen = {name: plain.pop(name) for name in CHOSEN}
         plain["simulator_settings"] = dict(self.simulator.settings)
         plain["simulator"] = self.simulator.name
@@ -170,7 +174,7 @@ def _by_field(data: Mapping[str, Any]) -> dict[str, Any]:
     moved = {*RECORDED_AS, *CHOSEN}
     field_of = {key: name for name, key in RECORDED_AS.items()}
     given = {**DEFAULTS_BEFORE_FIELD}
-    given |= {"simulator": given["simulator"].name, "simulator_settings": {}}
+    given |= {"simulator": given["simulator"].name, "simulator_settings": {}, "own_metrics": ()}
     for key, value in data.items():
         if key != "chosen":
             given[field_of.get(key, f"'{key}'" if key in moved else key)] = value

@@ -60,6 +60,18 @@ class _Track:
         return _Track({key: value[at] for key, value in self.columns.items()}, self.lane[at])
 
 
+def check_time_step(time_step: float) -> None:
+    """Refuse a time step out of range.
+
+    Raises:
+        InputError: it is.
+    """
+    if not LEAST_STEP <= time_step <= MOST_STEP:
+        raise InputError(
+            f"{LEAST_STEP:g} <= time_step <= {MOST_STEP:g} [s] must hold, got {time_step:g}"
+        )
+
+
 def clean(traffic: RecordedTraffic, time_step: float = TIME_STEP) -> Cleaned:
     """Clean a recording.
 
@@ -71,10 +83,7 @@ def clean(traffic: RecordedTraffic, time_step: float = TIME_STEP) -> Cleaned:
         InputError: a time step out of range.
         FileFormatError: units or frames that are not plausible, or nothing is left.
     """
-    if not LEAST_STEP <= time_step <= MOST_STEP:
-        raise InputError(
-            f"{LEAST_STEP:g} <= time_step <= {MOST_STEP:g} [s] must hold, got {time_step:g}"
-        )
+    check_time_step(time_step)
     # Units first: each later rule has thresholds in metres and seconds.
     plausibility.check(traffic)
     quality = Quality()

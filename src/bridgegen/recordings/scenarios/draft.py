@@ -18,13 +18,13 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.recordings.events.of_scenarios import Sought
 from bridgegen.recordings.scenarios.ranges import (
+    LEAST_SEEN,
     Range,
     bounds_of_speeds,
     seen_range,
     typical,
     with_room,
 )
-from bridgegen.scenario.exposure.fit import LEAST_ROWS
 from bridgegen.scenario.language.kinds import FLOAT
 from bridgegen.scenario.language.parameters import Bound
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml
@@ -138,9 +138,9 @@ def _attempt(
         ],
         axis=0,
     )
-    if inside.sum() < LEAST_ROWS:
+    if inside.sum() < LEAST_SEEN:
         raise InputError(
-            f"{inside.sum()} events are in ranges that it can hold; {LEAST_ROWS} are needed"
+            f"{inside.sum()} events are in ranges that it can hold; {LEAST_SEEN} are needed"
         )
     usual = {
         name: float(f"{values[typical(rows, names, inside)]:.{_DIGITS}g}")

@@ -14,6 +14,7 @@ from bridgegen.recordings.events.of_scenarios import ScenarioEvents, Sought
 from bridgegen.recordings.events.tables import FOLDER as EVENTS
 from bridgegen.recordings.scenarios.draft import mined_name
 from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade, mined_scenario
+from bridgegen.recordings.scenarios.ranges import held_in_words
 from bridgegen.scenario.ontology.builder import Builder
 from bridgegen.scenario.ontology.files import save
 from bridgegen.scenario.ontology.graph import Individuals
@@ -43,8 +44,8 @@ def mined_individuals(mined: Sequence[MinedScenario]) -> Individuals:
 
 def _statistics(scenario: MinedScenario) -> Iterator[tuple[str, str, float]]:
     """Yield name, unit and value of all that sums up a scenario's events."""
-    yield "events fitted", "count", float(scenario.fit.used)
-    met = scenario.fit.exposure.encounters
+    yield "events fitted" if scenario.fit else "events", "count", float(scenario.events)
+    met = scenario.met
     if met is not None:
         yield "encounters", "count", float(met.count)
         for name, unit, amount, rate in (
@@ -57,9 +58,11 @@ def _statistics(scenario: MinedScenario) -> Iterator[tuple[str, str, float]]:
                 yield f"encounters per {unit}, 2.5 %", f"1/{unit}", rate.low
                 yield f"encounters per {unit}, 97.5 %", f"1/{unit}", rate.high
     for each in scenario.ranges:
-        values = scenario.fit.parameters[each.parameter].values
         yield f"{each.parameter}, low", each.unit, each.mined.low
         yield f"{each.parameter}, high", each.unit, each.mined.high
+        if scenario.fit is None:
+            continue
+        values = scenario.fit.parameters[each.parameter].values
         yield f"{each.parameter}, mean", each.unit, float(values.mean())
         for share, value in zip(QUANTILES, np.quantile(values, QUANTILES).tolist(), strict=True):
             yield f"{each.parameter}, {share:.0%} quantile", each.unit, value
@@ -106,7 +109,8 @@ def write_mined(
         if isinstance(result, MinedScenario):
             scenario, _, distribution = (folder / f"{result.name}{end}" for end in ENDINGS)
             write_whole(scenario, [result.text.encode()])
-            write_whole(distribution, [distribution_xml(result.fit.exposure, date=DATE)])
+            if result.fit is not None:
+                write_whole(distribution, [distribution_xml(result.fit.exposure, date=DATE)])
         made.append(result)
     fitting(len(scenarios), len(scenarios))
     if scenarios_made := [item for item in made if isinstance(item, MinedScenario)]:
@@ -131,12 +135,11 @@ def _emptied(folder: Path, names: Sequence[str]) -> None:
 
 def made_row(scenario: MinedScenario) -> tuple[str, int, str, str]:
     """Return what the terminal shows of a scenario."""
-    met = scenario.fit.exposure.encounters
-    rate = met.per_hour if met else None
+    rate = scenario.met.per_hour if scenario.met else None
     beyond = [each.parameter for each in scenario.ranges if each.remark]
     return (
         scenario.name,
-        scenario.fit.used,
+        scenario.events,
         rate.in_words("h") if rate else "–",
         ", ".join(beyond) or "–",
     )
@@ -146,13 +149,13 @@ def made_as_json(scenario: MinedScenario | Unmade, out: Path) -> dict[str, objec
     """Return a scenario as plain data, or why there is none."""
     if isinstance(scenario, Unmade):
         return {"of": scenario.source, "scenario": None, "reason": scenario.reason}
-    met = scenario.fit.exposure.encounters
     return {
         "of": scenario.source,
         "scenario": str(out / FOLDER / f"{scenario.name}{ENDINGS[0]}"),
         "reason": None,
-        "events": scenario.fit.used,
-        "encounters": asdict(met) if met else None,
+        "events": scenario.events,
+        "holds": None if scenario.fit else held_in_words(scenario.events),
+        "encounters": asdict(scenario.met) if scenario.met else None,
         "ranges": [asdict(each) for each in scenario.ranges],
         "tightened": scenario.tightened,
     }

@@ -11,7 +11,8 @@ from bridgegen.base.errors import InputError
 from bridgegen.recordings.events.find import FoundEvents
 from bridgegen.recordings.events.of_scenarios import ScenarioEvents, Sought, broken_by, whole_share
 from bridgegen.recordings.scenarios.draft import MinedRange, draft, dumped, files_of
-from bridgegen.recordings.scenarios.ranges import fitted_names
+from bridgegen.recordings.scenarios.ranges import LEAST_SEEN, fitted_names, held_in_words
+from bridgegen.scenario.exposure.exposure import Encounters
 from bridgegen.scenario.exposure.fit import LEAST_ROWS, Fit, Progress, fit_exposure
 from bridgegen.scenario.language.scenario import LogicalScenario
 
@@ -32,7 +33,9 @@ class MinedScenario:
         text: the file.
         ranges: of its parameters.
         tightened: constraints that keep derived speeds within what was seen.
-        fit: of its exposure.
+        events: that its ranges are of.
+        met: how often it was met; None if nobody counted.
+        fit: of its exposure; None where the events are too few for a distribution.
     """
 
     name: str
@@ -40,7 +43,18 @@ class MinedScenario:
     text: str
     ranges: tuple[MinedRange, ...]
     tightened: tuple[str, ...]
-    fit: Fit
+    events: int
+    met: Encounters | None
+    fit: Fit | None
+
+    def facts(self) -> list[str]:
+        """Return what was found, a few words each."""
+        if self.fit is not None:
+            return [*self.fit.facts()]
+        rate = self.met.per_hour if self.met else None
+        met = [rate.in_words("h")] if rate else []
+        few = f"no distribution and no exposure: {LEAST_ROWS} events are needed"
+        return [held_in_words(self.events), *met, few]
 
 
 @dataclass(frozen=True)
@@ -75,16 +89,17 @@ def mined_scenario(
         progress: is told how many of how many parameters are fitted.
     """
     scenario = sought.scenario
-    enough = f"{LEAST_ROWS} are needed"
-    if events.complete < LEAST_ROWS:
+    enough = f"{LEAST_SEEN} are needed for ranges, {LEAST_ROWS} for a distribution"
+    if events.complete < LEAST_SEEN:
         return Unmade(scenario.name, f"{events.complete} events; {enough}")
     good = np.ones(events.complete, np.bool_)
     for _, breaks in broken_by(scenario, events.rows):
         good &= ~breaks
-    if good.sum() < LEAST_ROWS:
+    count = int(good.sum())
+    if count < LEAST_SEEN:
         return Unmade(
             scenario.name,
-            f"{good.sum()} of {events.complete} events keep its constraints; {enough}",
+            f"{count} of {events.complete} events keep its constraints; {enough}",
         )
     if own := files_of(sought):
         return Unmade(scenario.name, f"{own} lies beside its file: use --update")
@@ -93,29 +108,37 @@ def mined_scenario(
     if not names:
         return Unmade(scenario.name, "the events give none of the parameters that it searches")
     about = _about(events, found, time_step)
+    if count < LEAST_ROWS:
+        about += f" {held_in_words(count)}; too few for a distribution."
     try:
         made = draft(sought, rows, names, about)
         met = events.encounters
-        fitted = fit_exposure(
-            made.scenario,
-            table,
-            hours=met.hours if met else None,
-            km=met.km if met else None,
-            ignore=[name for name in events.rows if name not in names],
-            others="default" if _rest(made.scenario, names) else None,
-            source=about,
-            replicates=REPLICATES,
-            progress=progress,
+        fitted = (
+            None
+            if count < LEAST_ROWS
+            else fit_exposure(
+                made.scenario,
+                table,
+                hours=met.hours if met else None,
+                km=met.km if met else None,
+                ignore=[name for name in events.rows if name not in names],
+                others="default" if _rest(made.scenario, names) else None,
+                source=about,
+                replicates=REPLICATES,
+                progress=progress,
+            )
         )
     except InputError as error:
         return Unmade(scenario.name, "; ".join(error.problems))
-    block = fitted.text[fitted.text.index("\nexposure:") + 1 :]
+    block = fitted.text[fitted.text.index("\nexposure:") + 1 :] if fitted else ""
     return MinedScenario(
         made.scenario.name,
         scenario.name,
         f"{HEAD}\n{dumped(made.data)}{block}",
         made.ranges,
         tuple(str(bound) for bound in made.tightened),
+        fitted.used if fitted else count,
+        fitted.exposure.encounters if fitted else met,
         fitted,
     )
 

@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import betaincinv
 
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError
+from bridgegen.base.units import percent
 from bridgegen.scenario.language.constraints import order, problems_of
 from bridgegen.scenario.language.expression import parse
 from bridgegen.scenario.language.kinds import FLOAT, slack
@@ -17,6 +19,8 @@ from bridgegen.scenario.language.rules import cap, speeds_of
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.space import probes
 
+LEAST_SEEN = 5
+"""Least number of events of ranges without a distribution: they hold a third of the encounters."""
 DIGITS = 2
 """Digits of the ends of ranges: a hundredth of the width's power of ten."""
 _ROUNDS = 8
@@ -38,6 +42,22 @@ class Range:
 
     low: float
     high: float
+
+
+def held_in_words(count: int) -> str:
+    """Return how many encounters the range of so many events holds, 2 or more.
+
+    The share between the least and the greatest of n independent values of one distribution is
+    distributed as Beta(n - 1, 2), whatever that distribution is.
+
+    Source: Wilks, Determination of sample sizes for setting tolerance limits, Annals of
+    Mathematical Statistics 12 (1941) 91-96.
+    """
+    share = float(betaincinv(count - 1.0, 2.0, 0.05))
+    return (
+        f"{count:,} events: the range of a parameter, by itself, holds at least {percent(share)} "
+        "of such encounters with 95 % confidence (Wilks 1941, independent events)"
+    )
 
 
 def seen_range(values: Float) -> Range:

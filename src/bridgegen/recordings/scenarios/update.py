@@ -19,7 +19,8 @@ from bridgegen.base.errors import FileFormatError, InputError, StorageError
 from bridgegen.base.units import has_unit, in_unit
 from bridgegen.recordings.events.of_scenarios import ScenarioEvents, Sought, broken_by
 from bridgegen.recordings.events.tables import broken_in_words
-from bridgegen.recordings.scenarios.ranges import Range, around
+from bridgegen.recordings.scenarios.ranges import Range, around, held_in_words
+from bridgegen.scenario.exposure.fit import LEAST_ROWS
 from bridgegen.scenario.language.parameters import Parameter
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml, replaced
 from bridgegen.scenario.language.reader import build
@@ -196,6 +197,7 @@ def _diff(path: Path, before: str, after: str) -> str:
 def in_words(update: Update) -> list[str]:
     """Return what events say of a file, a sentence each."""
     texts = [f"{update.events:,} events, {update.kept:,} of which keep all constraints"]
+    texts += [held_in_words(update.kept)] if 1 < update.kept < LEAST_ROWS else []
     texts += update.broken
     for each in update.ranges:
         text = (

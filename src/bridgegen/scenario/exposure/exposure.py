@@ -41,6 +41,10 @@ MOST = 10**12
 """Largest number of encounters that may have been counted."""
 
 
+WEIGHED = "Weighed with a prior:"
+"""Begin of what the source of an exposure says of its prior."""
+
+
 @dataclass(frozen=True)
 class Rate:
     """A rate with its interval.
@@ -206,6 +210,12 @@ class Exposure:
                     f"depend on it by a formula{at(self.place)}"
                 )
         _ = self._order
+
+    @property
+    def weighed(self) -> str:
+        """What of it is a prior, as its source says since it was fitted; "" if nothing is."""
+        _, found, told = self.source.partition(WEIGHED)
+        return f"{found}{told}".strip()
 
     @property
     def names(self) -> tuple[str, ...]:

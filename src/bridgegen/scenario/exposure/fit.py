@@ -21,12 +21,13 @@ import scipy
 
 from bridgegen.base.arrays import Float, as_float
 from bridgegen.base.errors import InputError
+from bridgegen.base.units import percent
 from bridgegen.scenario.exposure.candidates import Candidate, candidates, fit
 from bridgegen.scenario.exposure.dependence import GaussianCopula
-from bridgegen.scenario.exposure.exposure import Exposure
+from bridgegen.scenario.exposure.exposure import WEIGHED, Exposure
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
 from bridgegen.scenario.exposure.marginals import Conditional, Form, Marginal
-from bridgegen.scenario.exposure.reader import build_exposure, exposure_text
+from bridgegen.scenario.exposure.reader import build_exposure, chosen_exposure, exposure_text
 from bridgegen.scenario.exposure.tables import cell_reader, read_header, read_table
 from bridgegen.scenario.language.exposure_schema import MarginalSection
 from bridgegen.scenario.language.parameters import Parameter, nearest
@@ -39,6 +40,9 @@ WIDEST = 0.2
 LEAST_ROWS = math.ceil(math.log(2.0 / 0.05) / (2.0 * WIDEST**2))
 """Least number of rows of a fit, 47, by the inequality of Dvoretzky, Kiefer, Wolfowitz and
 Massart."""
+
+BINS = 20
+"""Number of bins in which events are added to a prior."""
 
 GRID = 201
 """Number of points at which a density and its band are known."""
@@ -128,6 +132,8 @@ class Fit:
                     yield rate.in_words(unit)
         yield f"{self.exposure.feasible_share.estimate:.2%} keep the constraints"
         yield f"seed {self.seed}"
+        if self.exposure.weighed:
+            yield f"{percent(LEAST_ROWS / (self.used + LEAST_ROWS))} of it is the prior"
 
     def remarks(self) -> list[str]:
         """Return what a reader must know, a sentence each."""
@@ -144,6 +150,7 @@ def fit_exposure(
     ignore: Sequence[str] = (),
     others: Literal["uniform", "default"] | None = None,
     source: str | None = None,
+    prior: str | Path | Exposure | None = None,
     replicates: int = 200,
     seed: int = 0,
     progress: Progress | None = None,
@@ -159,6 +166,8 @@ def fit_exposure(
         ignore: columns that are no parameters.
         others: searched parameters that have no column: spread evenly, or at their default.
         source: where the events come from, for the file.
+        prior: an exposure that counts as `LEAST_ROWS` events besides these, see `_weighted`; as for
+            `chosen_exposure`.
         replicates: how many times events are resampled, and how many samples the p values take.
         seed: of all chance, at least 0.
         progress: called with the number of parameters done, and of all.
@@ -182,14 +191,17 @@ def fit_exposure(
     rows = len(next(iter(columns.values())))
     inside, outside = _inside(scenario, columns)
     used = int(inside.sum())
-    if used < LEAST_ROWS:
+    before = None if prior is None else chosen_exposure(scenario, prior)
+    if used < (LEAST_ROWS if before is None else 1):
         raise InputError(
             f"a fit needs {LEAST_ROWS} events in the scenario's ranges, got {used} of {rows}: "
-            f"fewer leave the distribution function unknown by more than {WIDEST:g} (95 %)",
+            f"fewer leave the distribution function unknown by more than {WIDEST:g} (95 %); "
+            "with --prior EXPOSURE, fewer are weighed against an exposure that you trust",
             *outside,
         )
     columns = {name: np.ascontiguousarray(column[inside]) for name, column in columns.items()}
-    _refuse_constant(scenario, columns)
+    if before is None:
+        _refuse_constant(scenario, columns)
     fitted: dict[str, ParameterFit] = {}
     refits: dict[str, list[Form]] = {}
     # The same resampled events for all parameters: rows are drawn whole, which keeps their
@@ -199,7 +211,12 @@ def fit_exposure(
         if progress is not None:
             progress(number, len(columns))
         parameter = scenario.parameters[name]
-        fitted[name], refits[name] = _fit_parameter(parameter, values, draws, seed, number)
+        if before is None:
+            fitted[name], refits[name] = _fit_parameter(parameter, values, draws, seed, number)
+        else:
+            fitted[name], refits[name] = _weighted(
+                parameter, values, draws, before.marginals[name], seed, number
+            )
     correlated = tuple(name for name in columns if not scenario.parameters[name].kind.apart)
     scores = np.array([_normal_scores(columns[name]) for name in correlated])
     correlation = _correlation(scores)
@@ -209,10 +226,21 @@ def fit_exposure(
             for rows in draws
         ]
     )
+    weighed = ""
+    if before is not None:
+        share = used / (used + LEAST_ROWS)
+        at = [before.names.index(name) for name in correlated]
+        known = before.copula.matrix[np.ix_(at, at)]
+        correlation = share * correlation + (1.0 - share) * known
+        resampled = share * resampled + (1.0 - share) * known
+        weighed = (
+            f"{WEIGHED} {used} events count {percent(share)}, and {percent(1.0 - share)} "
+            f"is the prior ({before.source.strip().rstrip('.')})."
+        )
     data: dict[str, Any] = {
         "exposure_of": scenario.name,
         "exposure": {
-            "source": _source(source, origin, used),
+            "source": " ".join(filter(None, [_source(source, origin, used), weighed])),
             **({"others": others} if others else {}),
             "parameters": {name: parameter_fit.section for name, parameter_fit in fitted.items()},
             "dependence": {"correlation": _pairs(correlated, correlation)},
@@ -246,7 +274,7 @@ def fit_exposure(
         correlation_band=np.quantile(resampled, [0.025, 0.975], axis=0),
         replicates=_replicated(exposure, refits, correlated, resampled),
         seed=seed,
-        notes=_notes(exposure, scenario, columns),
+        notes=(*([weighed] if weighed else []), *_notes(exposure, scenario, columns)),
     )
 
 
@@ -421,6 +449,81 @@ def _fit_single(
         band=np.quantile(densities, [0.025, 0.975], axis=0),
         quantiles=nothing,
         envelope=np.empty((2, 0)),
+    ), refits
+
+
+def _weighted(
+    parameter: Parameter,
+    values: Float,
+    draws: Sequence[npt.NDArray[np.int64]],
+    before: Marginal | Conditional,
+    seed: int,
+    number: int,
+) -> tuple[ParameterFit, list[Form]]:
+    """Return the mean of a Dirichlet distribution's posterior: a histogram, or shares.
+
+    The prior counts as `LEAST_ROWS` events, spread over `BINS` bins or single values as it says;
+    the events are added to these. Then n events have the weight n / (n + LEAST_ROWS).
+
+    Source: Ferguson, A Bayesian analysis of some nonparametric problems, Annals of Statistics 1
+    (1973) 209-230, section 5a.
+    """
+    if isinstance(before, Conditional):
+        raise InputError(
+            f"the prior of {parameter.name} depends on other parameters; a prior must say how it "
+            "is distributed by itself"
+        )
+    low, high, is_apart = parameter.low, parameter.high, parameter.kind.apart
+    if is_apart:
+        at = np.arange(math.ceil(low), math.floor(high) + 1.0)
+        edges = np.append(at - 0.5, at[-1] + 0.5)
+        chances = np.exp(before.log_density(at))
+    else:
+        at, edges = np.linspace(low, high, GRID), np.linspace(low, high, BINS + 1)
+        chances = np.diff(before.tails(edges)[0])
+    chances = chances / chances.sum()
+
+    def section(sample: Float) -> dict[str, Any]:
+        weights = LEAST_ROWS * chances + np.histogram(sample, edges)[0]
+        if not is_apart:
+            return {
+                "distribution": "histogram",
+                "edges": edges.tolist(),
+                "weights": [float(f"{weight:.6g}") for weight in weights],
+            }
+        there = [(float(v), float(f"{w:.6g}")) for v, w in zip(at, weights, strict=True) if w > 0.0]
+        return {
+            "distribution": "discrete",
+            "values": [parameter.kind.written(value) for value, _ in there],
+            "weights": [weight for _, weight in there],
+        }
+
+    best, ordered, n = section(values), np.sort(values), len(values)
+    marginal = _form(best, parameter)
+    assert not isinstance(marginal, Conditional)
+    refits = [_form(section(values[rows]), parameter) for rows in draws]
+    with np.errstate(divide="ignore"):
+        densities = [np.exp(refit.log_density(at)) for refit in refits]
+    samples = [
+        np.sort(_at_share(marginal, _generator(seed, 1 + number, k).random(n)))
+        for k in range(len(draws))
+    ]
+    return ParameterFit(
+        name=parameter.name,
+        unit=parameter.unit,
+        values=ordered,
+        section=best,
+        marginal=marginal,
+        form="prior and events",
+        ranking=(),
+        distance=math.nan if is_apart else _distance(ordered, marginal),
+        # Not tested: the prior is not of these events, and may well be another distribution.
+        p=math.nan,
+        at=at,
+        density=np.exp(marginal.log_density(at)),
+        band=np.quantile(densities, [0.025, 0.975], axis=0),
+        quantiles=_at_share(marginal, (np.arange(n) + 0.5) / n),
+        envelope=np.quantile(samples, [0.025, 0.975], axis=0),
     ), refits
 
 
