@@ -182,19 +182,20 @@ def write_report(path: Path, data: ReportData) -> None:
     write_whole(Path(path), [report_page(data)])
 
 
-def report_page(data: ReportData, *, live: bool = False) -> bytes:
+def report_page(data: ReportData, *, live: bool = False, **more: Any) -> bytes:
     """Return the report as HTML.
 
     Args:
         data: of the report.
         live: whether ``bridgegen open`` serves it, so that it can request updates.
+        **more: values of the template: "home", "verdict", "trail".
     """
     title = f"{data.summary.scenario}: {data.summary.title}"
     modules, connect = (SERVED, "self") if live else (REPORT, "none")
     # The data are cut to what the code leaves of the page's size.
-    code = len(_page("page.html", modules, title, "", connect=connect))
+    code = len(_page("page.html", modules, title, "", connect=connect, **more))
     text = to_json(data, live=live, code=code)
-    return _page("page.html", modules, title, text, connect=connect)
+    return _page("page.html", modules, title, text, connect=connect, **more)
 
 
 def write_page(path: Path, entry: str, title: str, data: str, **more: Any) -> None:

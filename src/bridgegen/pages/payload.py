@@ -83,8 +83,11 @@ def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
     wanted += [mode.shown for mode in modes]
     wanted += [criterion.at - 1 for criterion in data.criteria if criterion.at is not None]
     shown = _shown(data.evaluations, wanted)
+    if data.alone:
+        shown = np.isin(np.arange(shown.size), wanted[:1])
     page = {
         "live": False,
+        "alone": data.alone,
         "summary": _summary(data),
         **_of_rows(data, shown),
         "minimal": packed_motions(data.minimal, index, SIZE, of_rows=False),
