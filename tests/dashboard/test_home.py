@@ -20,6 +20,7 @@ from bridgegen.jobs.dashboard.home import Home
 from bridgegen.jobs.suite.page import write_suite_page
 from bridgegen.jobs.suite.suite import read_suite
 from bridgegen.jobs.view.server import LOOPBACK, MAX_BODY, Server, answer
+from bridgegen.pages.page import scripted
 from bridgegen.results.failures import (
     FILE,
     ChangedError,
@@ -98,6 +99,13 @@ def test_home_says_what_the_dashboard_says_and_leads_to_every_result(home):
             assert answer(home, f"/{link.partition('#')[0]}").status in (200, 302), link
 
 
+def test_every_id_that_its_script_asks_for_exists(home):
+    for page, entry in ((home.page(), "runs.js"), (answer(home, "/p/").body, "status.js")):
+        wanted = set(re.findall(r'\$\("([\w-]+)"\)', scripted(entry)[0]))
+        assert wanted
+        assert wanted <= set(re.findall(r'id="([\w-]+)"', page.decode()))
+
+
 def test_the_logo_of_each_page_leads_home(home, copy):
     number = next(run["number"] for run in home.facts() if run["path"] == "runs/reference")
     report = (copy / "runs/reference/report.html").read_bytes()
@@ -159,12 +167,13 @@ def test_hostile_names_titles_and_comments_are_text(copy):
     text = re.sub(r'(<h1 id="title">).*?(</h1>)', lambda m: m[1] + escaped + m[2], text)
     made.write_text(text, "utf-8")
     home = Home(copy)
-    assert home.decide(asked(home, comment=title))[0] == 200
+    wanted = asked(home, comment=title)
+    assert home.decide(wanted)[0] == 200
     for page in (home.page(), answer(home, "/p/").body, answer(home, "/pair?first=0&second=1").body):
         tags = Tags(page)
         assert "img" not in tags.found
         assert page.count(b"</script>") == tags.found.count("script")
-    assert data_of(home.page())["modes"][asked(home)["mode"]]["comment"] == title
+    assert data_of(home.page())["modes"][wanted["mode"]]["comment"] == title
 
 
 # ---- what is served from the disk ----

@@ -131,7 +131,7 @@ GLOBALS = {*re.findall(r"\w+", """
     String TextDecoder TypeError URL Uint8Array addEventListener atob clearTimeout
     decodeURIComponent document encodeURIComponent fetch getComputedStyle history innerHeight
     innerWidth localStorage location matchMedia navigator performance Promise
-    requestAnimationFrame setTimeout window
+    requestAnimationFrame sessionStorage setTimeout window
 """)}  # fmt: skip
 TOKEN = re.compile(
     r"""(?P<skip>\s+|//[^\n]*|/\*.*?\*/)|(?P<text>"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')"""

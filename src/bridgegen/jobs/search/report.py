@@ -24,6 +24,7 @@ from bridgegen.search.triage.fresh import FRESH, failing_draws
 from bridgegen.search.triage.record import JSON_FILE as TRIAGE_FILE
 from bridgegen.search.triage.record import Triage
 from bridgegen.search.triage.record import read_record as read_triage
+from bridgegen.simulation.choice import EMBEDDED
 
 MOST_SENT = 1_000_000
 """Maximum length of a page that is sent [bytes]: what any mail and any tracker takes."""
@@ -99,11 +100,12 @@ def finding_page(pipeline: Pipeline, run: Run, rows: Rows | Recorded, name: str)
     if data is None:
         raise UnknownNameError(f"scenario of {run.folder}", name, [item.name for item in exported])
     (playback,) = data.kept
-    driver = ["--ego", pipeline.driver.name] if pipeline.driver.is_own else []
-    found = playback.conflict.summary.sentence if playback.conflict else f"Scenario {name}"
-    found = "; ".join(found.rstrip(".").split("; ")[:2])  # the player has the whole sentence
+    given = ["--ego", pipeline.driver.name] if pipeline.driver.is_own else []
+    simulator = run.settings.simulator.name
+    given += ["--simulator", simulator] if simulator != EMBEDDED.name else []
+    found = playback.conflict.summary.bare if playback.conflict else f"Scenario {name}"
     text = f"{found[:1].upper()}{found[1:]}. Save its files from this page and simulate them:"
-    command = shlex.join(["bridgegen", "simulate", f"{name}.xosc", *driver])
+    command = shlex.join(["bridgegen", "simulate", f"{name}.xosc", *given])
     banner = Banner(
         text, "fails" if playback.critical else "", "FAILS" * playback.critical, command
     )

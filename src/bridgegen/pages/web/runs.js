@@ -111,7 +111,7 @@ class Runs {
     link.setAttribute("aria-disabled", `${!ready}`);
     if (ready) link.setAttribute("href", `pair?first=${a}&second=${b}`);
     else link.removeAttribute("href");
-    link.textContent = ready ? "Show the two side by side" : b === undefined && a !== undefined ? "Choose one more run" : "Choose two runs to see them side by side";
+    link.textContent = ready ? "Show the two side by side" : b === undefined && a !== undefined ? "Choose one more run" : "Choose two runs to compare";
   }
 
   // The searches that run now, each with its counts.
