@@ -1,4 +1,4 @@
-"""One crash as one page: what it holds, what it leaves out, and that its files do the same again."""
+"""One crash as one page: what it holds and leaves out; its files do the same again."""
 
 import json
 import re
@@ -9,8 +9,8 @@ import pytest
 from tests.approval import approve, refuses
 
 import bridgegen as bg
-from bridgegen.engine.simulate import simulate_file
 from bridgegen.base.errors import InputError, StorageError, UnknownNameError
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.search import report
 from bridgegen.jobs.search.report import MOST_SENT, write_finding_page
 from bridgegen.jobs.view.run_view import RunView
@@ -80,7 +80,9 @@ def test_files_that_find_no_room_are_not_left_out_silently(finished, tmp_path):
     """A town's map, say: a link that leads beside the page would lead nowhere."""
     run = shutil.copytree(finished, tmp_path / "run")
     road = run / "critical" / "0001.xodr"
-    noise = "\n".join(f"<!-- {k * 7919 % 1000003:x} {k * k * 104729 % 999983:x} -->" for k in range(60_000))
+    noise = "\n".join(
+        f"<!-- {k * 7919 % 1000003:x} {k * k * 104729 % 999983:x} -->" for k in range(60_000)
+    )
     road.write_text(f"{road.read_text('utf-8')}{noise}", "utf-8")
     with refuses(InputError, "0001.xodr"):
         write_finding_page(run, "0001", tmp_path / "a.html")
@@ -104,9 +106,8 @@ def test_its_files_are_saved_from_it_and_do_the_same_again(browser, sent, finish
     page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
     page.goto(sent.as_uri())
     page.wait_for_function("window.bridgegen?.state()?.scenario === '0002'")
-    assert page.locator("main > section:visible").evaluate_all("all => all.map((one) => one.id)") == [
-        "scenarios", "summary", "made-of", "provenance"
-    ]  # fmt: skip
+    seen = page.locator("main > section:visible").evaluate_all("all => all.map((one) => one.id)")
+    assert seen == ["scenarios", "summary", "made-of", "provenance"]
     assert page.locator(".send").count() == 0
     for kind in ("xosc", "xodr"):
         with page.expect_download() as download:
@@ -138,7 +139,7 @@ def test_a_served_report_saves_it_and_one_on_disk_says_how(browser, finished, tm
     server.shutdown()
     server.server_close()
     page.goto((finished / "report.html").as_uri())
-    page.evaluate("navigator.clipboard.writeText = (text) => { window.copied = text; return Promise.resolve(); }")
+    page.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
     page.click("text=Send this crash")
     assert re.fullmatch(
         rf"bridgegen export {re.escape(str(finished))} --flavour page --scenario 000\d",

@@ -224,7 +224,9 @@ class Home(FolderView):
         if _GENERATOR.search(body[:1000].decode("utf-8", "replace")) is None:
             return None
         # Pages on the disk lead nowhere; here their logo leads back.
-        body = _BRAND.sub(rb'<a class="brand" href="%s">\1</a>' % home.encode(), body, count=1)
+        body = _BRAND.sub(
+            rb'<a class="brand" href="%s" target="_top">\1</a>' % home.encode(), body, count=1
+        )
         return Answer(HTTPStatus.OK, TYPES["html"], body, OF_DISK)
 
     # --- What a person decides ---

@@ -115,8 +115,8 @@ def finding_page(pipeline: Pipeline, run: Run, rows: Rows | Recorded, name: str)
     if len(page) > MOST_SENT or len(held) < len(files):
         kinds = joined([f"{path} ({len(text):,} bytes)" for path, text in files.items()])
         raise InputError(
-            f"{run.folder}: scenario {name} is too large for a page of {MOST_SENT:,} bytes: {kinds}; "
-            f"send its files: bridgegen export {run.folder} --flavour resolved --scenario {name}"
+            f"{run.folder}: scenario {name} is too large for a page of {MOST_SENT:,} bytes: {kinds}"
+            f"; send its files: bridgegen export {run.folder} --flavour resolved --scenario {name}"
         )
     return page
 
