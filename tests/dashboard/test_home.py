@@ -481,7 +481,8 @@ def test_a_stranger_s_page_can_neither_read_nor_write(browser, served, home, cop
     attack = f"""<script>
     const at = location.href.split("/p/")[0];
     const headers = {{ "Content-Type": "application/json" }};
-    const write = fetch(at + "/status", {{ method: "POST", headers, body: JSON.stringify({wanted}) }});
+    const body = JSON.stringify({wanted});
+    const write = fetch(at + "/status", {{ method: "POST", headers, body }});
     const plain = fetch(at + "/status", {{ method: "POST", mode: "no-cors", body: "{{}}" }});
     window.tried = Promise.allSettled([write, plain, fetch(at + "/")])
       .then((all) => all.map((one) => one.status));
