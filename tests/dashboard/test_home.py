@@ -61,7 +61,7 @@ def digests(folder: Path) -> dict[str, str]:
 
 def asked(home: Home, **changed: Any) -> dict[str, Any]:
     """Return what the page would send for the first failure mode."""
-    modes = data_of(home.page())["modes"]
+    modes = data_of(home.page())["edits"]["modes"]
     mode, shown = next((id, one) for id, one in modes.items() if not one["by"])
     was = [shown["status"], shown["comment"]]
     return {"mode": mode, "status": "known", "comment": "seen on A7", "was": was} | changed
@@ -177,7 +177,7 @@ def test_hostile_names_titles_and_comments_are_text(copy):
         tags = Tags(page)
         assert "img" not in tags.found
         assert page.count(b"</script>") == tags.found.count("script")
-    assert data_of(home.page())["modes"][wanted["mode"]]["comment"] == title
+    assert data_of(home.page())["edits"]["modes"][wanted["mode"]]["comment"] == title
 
 
 # ---- what is served from the disk ----
@@ -235,7 +235,7 @@ def test_a_status_and_a_comment_are_written_into_the_one_file_and_nowhere_else(h
     assert (block.status, block.comment) == ("known", "seen on A7")
     after = digests(copy)
     assert {name for name in after if before.get(name) != after[name]} == {FILE}
-    assert data_of(home.page())["modes"][wanted["mode"]]["status"] == "known"
+    assert data_of(home.page())["edits"]["modes"][wanted["mode"]]["status"] == "known"
     assert b"known" in answer(home, "/p/").body
 
 
@@ -266,7 +266,7 @@ def test_of_two_editors_the_second_is_told_and_loses_nothing(home, copy):
 
 
 def test_another_mode_is_no_conflict(home, copy):
-    modes = [id for id, one in data_of(home.page())["modes"].items() if not one["by"]][:2]
+    modes = [id for id, one in data_of(home.page())["edits"]["modes"].items() if not one["by"]][:2]
     for mode in modes:
         assert home.decide(asked(home, mode=mode))[0] == 200
     assert {*modes} <= read_failures(copy).failures.keys()
@@ -325,7 +325,7 @@ def test_a_mode_that_a_suite_keeps_is_decided_there(home, copy, monkeypatch):
     mode = next(one for one in found.modes if one.key.id == wanted["mode"])
     kept = copy / "suites" / FILE
     write_failures(read_failures(kept.parent), {mode.key.id: Failure(status="accepted")})
-    by = data_of(home.page())["modes"][wanted["mode"]]["by"]
+    by = data_of(home.page())["edits"]["modes"][wanted["mode"]]["by"]
     assert by.startswith(f"suites/{FILE}")
     before = digests(copy)
     status, told = home.decide(wanted)
@@ -444,6 +444,19 @@ def test_a_click_sets_the_status_on_home_and_dashboard(opened, served, copy):
     assert opened.evaluate("window.hit") is None
     opened.click("a.brand")
     opened.wait_for_url(served.url)
+    assert opened.complaints == []
+
+
+@pytest.mark.browser
+def test_a_report_that_the_project_serves_sets_the_status_of_its_modes(opened, copy):
+    opened.click("text=runs/route-follower")
+    first = opened.locator("#modes-list select[data-status]").first
+    mode = first.get_attribute("data-status")
+    with opened.expect_navigation():
+        first.select_option("known")
+    assert read_failures(copy).failures[mode].status == "known"
+    opened.click("a.brand")
+    assert opened.input_value(f"[data-status={mode}]") == "known"
     assert opened.complaints == []
 
 

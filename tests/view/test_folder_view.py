@@ -223,7 +223,7 @@ def test_runs_are_filtered_sorted_and_two_of_them_play_side_by_side(browser, run
         frame.wait_for_function("window.bridgegen?.state()?.playing")
     assert len(page.frames) == 3
     page.click("text=All runs")
-    page.wait_for_url(server.url)
+    page.wait_for_url(f"{server.url}#searches")
     page.click("text=week 2/again")
     page.wait_for_url(re.compile("/run/"))
     page.wait_for_function("bridgegen.state() !== null")

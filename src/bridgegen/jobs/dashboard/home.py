@@ -20,9 +20,11 @@ from bridgegen.jobs.dashboard.dashboard import PAGE, Dashboard, dashboard_of
 from bridgegen.jobs.dashboard.modes import OpenMode, cleaned
 from bridgegen.jobs.dashboard.page import banner, modes_table, page_of
 from bridgegen.jobs.dashboard.project import Project, kind_of, read_project
+from bridgegen.jobs.dashboard.results_of import key_of
 from bridgegen.jobs.search.run import REPORT
 from bridgegen.jobs.view.folder_view import FolderView
 from bridgegen.jobs.view.overview import MOST_RUNS, find_folders
+from bridgegen.jobs.view.run_view import RunView
 from bridgegen.jobs.view.server import OF_DISK, TYPES, Answer
 from bridgegen.pages import templates
 from bridgegen.pages.page import scripted
@@ -39,6 +41,8 @@ from bridgegen.results.failures import (
     read_old_file,
     write_failures,
 )
+from bridgegen.search.triage.record import JSON_FILE as TRIAGE
+from bridgegen.search.triage.record import read_record
 
 MOST_MODES = 8
 """Maximum number of failure modes of the home page; the dashboard has all."""
@@ -49,6 +53,9 @@ HEAD, MOST_BYTES = 262_144, 64_000_000
 SERVED = {".xosc", ".xodr", ".owl", ".json", ".csv", ".yaml", ".yml", ".txt", ".md", ".parquet"}
 SERVED |= {".gif", ".webp", ".mp4", ".webm", ".png", ".svg"}
 """Endings of the files that are saved from pages of the project."""
+
+SOURCES = Markup("script-src 'unsafe-inline'; connect-src 'self'; ")
+"""What a page of ours may do where a status is set in it."""
 
 _GENERATOR = re.compile(r'<meta name="generator" content="[Bb]ridge[Gg]en ([a-z -]{1,40})">')
 _TITLE = re.compile(r'<h1 id="title">(.*?)</h1>', re.DOTALL)
@@ -162,7 +169,7 @@ class Home(FolderView):
         """Return the home page, as HTML."""
         found = self._dashboard()
         script, css = scripted("runs.js")
-        data = {"runs": self.facts(), **self._edits(found, "")}
+        data = {"runs": self.facts(), "edits": self._edits(found, "")}
         return templates.page(
             "jobs/dashboard/home.html",
             title=self.folder.name or "project",
@@ -177,6 +184,25 @@ class Home(FolderView):
             script=script,
         )
 
+    def run(self, number: int) -> RunView | None:
+        """Return the site of a run by its number; its failure modes have their statuses, too."""
+        if (view := super().run(number)) is not None:
+            view.also = lambda: self._of_run(view.folder)
+        return view
+
+    def _of_run(self, folder: Path) -> dict[str, Any]:
+        """Return what a run's page needs to set statuses: also the ids of its failure modes."""
+        found, place = self._dashboard(), folder.relative_to(self.folder).as_posix()
+        runs = found.project.runs if found else ()
+        result = next((run for run in runs if run.source == place), None)
+        record = read_record(folder / TRIAGE)
+        if result is None or record is None:
+            return {}
+        ids = {
+            mode.number: key_of(mode, result.scenario, result.driver).id for mode in record.modes
+        }
+        return {"edits": self._edits(found, "../../"), "mode_ids": ids}
+
     def place(self, path: str) -> Answer | None:
         """Return what is at a path of the project's folder; None if nothing is served from there.
 
@@ -188,9 +214,9 @@ class Home(FolderView):
             if (found := self._dashboard()) is None:
                 return None
             script, css = scripted("status.js")
-            data = Markup(script_json(self._edits(found, "../")))
+            data = Markup(script_json({"edits": self._edits(found, "../")}))
             css = Markup(templates.style("jobs/dashboard/page.css")) + css
-            page = page_of(found, home="../", css=css, **_scripts(data, script))
+            page = page_of(found, home="../", css=css, sources=SOURCES, data=data, script=script)
             return Answer(HTTPStatus.OK, TYPES["html"], page)
         if any(part.startswith(".") for part in parts) or "\\" in path or "\0" in path:
             return None
@@ -290,18 +316,6 @@ def _own_id(mode: OpenMode) -> str:
         return mode.key.id
     head = f"{FILE}: "
     return mode.decided.removeprefix(head) if mode.decided.startswith(head) else ""
-
-
-def _scripts(data: Markup, script: Markup) -> dict[str, Markup]:
-    """Return what a page without scripts takes to set statuses, and the sources for it."""
-    text = Markup(
-        '<script type="application/json" id="data">{}</script>\n'
-        '<script>\n(() => {{\n"use strict";\n{}\n}})();\n</script>'
-    ).format(data, script)
-    return {
-        "script": text,
-        "sources": Markup("script-src 'unsafe-inline'; connect-src 'self'; "),
-    }
 
 
 def _text(markup: str | None) -> str:

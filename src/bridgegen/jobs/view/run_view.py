@@ -1,7 +1,7 @@
 """A run as a site: its page, the news since, the motion of any scenario, its files."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ class RunView:
 
     Attributes:
         home: address of the page that leads here; "" where there is none.
+        also: returns what its page holds besides, by key.
 
     Raises:
         StorageError: not a run, or its scenario or map is not what it was.
@@ -50,6 +51,7 @@ class RunView:
         self._run = Run(folder)
         self.folder, self.settings = self._run.folder, self._run.settings
         self.home = ""
+        self.also: Callable[[], Mapping[str, Any]] = dict
         self._rows: Recorded | None = None
         self._pipeline = pipeline_of(self._run, "open", ego=ego, simulator=simulator)
         # The server's threads share the rows in memory, which each request may extend.
@@ -76,7 +78,7 @@ class RunView:
             rows = self._read(store)
             run = Run.of(store, rows)
             data = run_data(self._pipeline, run, rows, run.exported(len(rows)))
-            return report_page(data, live=True, home=self.home)
+            return report_page(data, live=True, also=self.also(), home=self.home)
 
     def news(self, after: int) -> Mapping[str, Any]:
         """Return what is new since the page knew of so many evaluations."""

@@ -2,14 +2,14 @@
 
 import { $, element } from "./common.js";
 
-const edits = JSON.parse($("data").textContent);
+const edits = JSON.parse($("data").textContent).edits; // of a run alone there are none
 const BACK_TO = "bridgegen-mode"; // where the reader was, over a reload
 
 class StatusOfMode {
   constructor(pill, mode) {
     this.mode = mode;
     this.known = edits.modes[mode];
-    const row = pill.closest("tr"), name = row.querySelector("th").innerText.split("\n")[0];
+    const row = pill.closest("tr, li"), name = row.querySelector("th, h3").textContent.trim().split("\n")[0];
     this.choice = element("select", { "aria-label": `Status of: ${name}`, "data-status": mode }, ...edits.statuses.map((status) => element("option", { value: status }, status)));
     this.comment = element("input", { type: "text", "aria-label": `Comment on: ${name}`, placeholder: "comment", maxlength: edits.most });
     this.said = element("small", { role: "alert", class: "bad" });
@@ -39,7 +39,7 @@ class StatusOfMode {
 }
 
 for (const pill of document.querySelectorAll("[data-mode]")) {
-  const { mode } = pill.dataset, known = edits.modes[mode];
+  const { mode } = pill.dataset, known = edits?.modes[mode];
   if (known?.by) pill.title = `Set in ${known.by}`;
   else if (known) new StatusOfMode(pill, mode);
 }
