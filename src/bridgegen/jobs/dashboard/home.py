@@ -58,12 +58,13 @@ SOURCES = Markup("script-src 'unsafe-inline'; connect-src 'self'; ")
 """What a page of ours may do where a status is set in it."""
 
 _GENERATOR = re.compile(r'<meta name="generator" content="[Bb]ridge[Gg]en ([a-z -]{1,40})">')
-_TITLE = re.compile(r'<h1 id="title">(.*?)</h1>', re.DOTALL)
+# Bounded: a stranger's page must not take a long time.
+_TITLE = re.compile(r'<h1 id="title">(.{0,1000}?)</h1>', re.DOTALL)
 _BANNER = re.compile(
-    r'<div class="banner (\w*)" role="status">(?:<b>(.*?)</b> )?<p>(.*?)</p>', re.DOTALL
+    r'<div class="banner (\w*)" role="status">(?:<b>(.{0,99}?)</b> )?<p>(.{0,4000}?)</p>', re.DOTALL
 )
-_FACTS = re.compile(r'<ul class="facts"[^>]*>(.*?)</ul>', re.DOTALL)
-_BRAND = re.compile(rb'<span class="brand">(.*?)</span>', re.DOTALL)
+_FACTS = re.compile(r'<ul class="facts"[^>]{0,99}>(.{0,4000}?)</ul>', re.DOTALL)
+_BRAND = re.compile(rb'<span class="brand">(.{0,999}?)</span>', re.DOTALL)
 
 _NOT_LISTED = ("search", "dashboard", "view")
 """Kinds of pages that the home page has otherwise."""
@@ -218,7 +219,7 @@ class Home(FolderView):
             css = Markup(templates.style("jobs/dashboard/page.css")) + css
             page = page_of(found, home="../", css=css, sources=SOURCES, data=data, script=script)
             return Answer(HTTPStatus.OK, TYPES["html"], page)
-        if any(part.startswith(".") for part in parts) or "\\" in path or "\0" in path:
+        if any(part.startswith((".", "/")) or "\\" in part for part in parts):
             return None
         if parts[-1] == REPORT and (number := self._number(self.folder.joinpath(*parts[:-1]))):
             try:
@@ -242,7 +243,7 @@ class Home(FolderView):
             if (self.folder / path).stat().st_size > MOST_BYTES:
                 return None
             body = read_inside(self.folder, path)
-        except (OSError, ValueError):
+        except (BridgeGenError, OSError, ValueError):  # a link that leads out of it, a NUL
             return None
         if suffix != ".html":
             saved = {**OF_DISK, "Content-Disposition": "attachment"}
