@@ -10,6 +10,7 @@ from bridgegen.jobs.view.overview import RunLine, find_runs, read_line
 from bridgegen.jobs.view.run_view import RunView
 from bridgegen.pages import templates
 from bridgegen.pages.sentences import NARROW, share
+from bridgegen.results.store.run_file import FILE
 from bridgegen.search.triage.record import Mode
 
 MOST_OPEN = 4
@@ -30,6 +31,7 @@ class FolderView:
         self.folder = Path(folder).resolve()
         self._runs: list[Path] = []  # by number
         self._views: dict[int, RunView] = {}
+        self._known: dict[int, tuple[tuple[int, int], Mapping[str, Any]]] = {}
         self._find()
 
     def _find(self) -> None:
@@ -40,14 +42,27 @@ class FolderView:
     def facts(self) -> list[Mapping[str, Any]]:
         """Return what the list says of each run, by number."""
         self._find()
-        return [_facts(k, read_line(self.folder, run)) for k, run in enumerate(self._runs)]
+        return [self._facts(k) for k in range(len(self._runs))]
 
     def news(self, after: Sequence[int]) -> Mapping[str, Any]:
         """Return how many runs there are, and the facts of some, by their numbers."""
         self._find()
         some = [k for k in after if k < len(self._runs)]
-        facts = [_facts(k, read_line(self.folder, self._runs[k])) for k in some]
-        return {"total": len(self._runs), "runs": facts}
+        return {"total": len(self._runs), "runs": [self._facts(k) for k in some]}
+
+    def _facts(self, number: int) -> Mapping[str, Any]:
+        """Return what the list says of a run; of one that has ended, read once."""
+        run = self._runs[number]
+        try:
+            # A file that replaces another changes the folder's time.
+            mark = run.stat().st_mtime_ns, (run / FILE).stat().st_mtime_ns
+        except OSError:
+            mark = 0, 0
+        known = self._known.get(number)
+        if known is None or known[0] != mark or not known[1]["finished"]:
+            known = mark, _facts(number, read_line(self.folder, run))
+            self._known[number] = known
+        return known[1]
 
     def run(self, number: int) -> RunView | None:
         """Return the site of a run by its number; None if there is none.
