@@ -76,6 +76,14 @@ def test_what_cannot_be_sent_is_one_clear_error(finished, cli, tmp_path, monkeyp
     assert [path.name for path in tmp_path.iterdir()] == ["other.html"]
 
 
+def test_a_run_without_a_crash_has_none_to_send(finished, tmp_path):
+    run = shutil.copytree(finished, tmp_path / "run")
+    shutil.rmtree(run / "critical")
+    for name in (None, "0001"):
+        with refuses(InputError, "exported"):
+            write_finding_page(run, name, tmp_path / "a.html")
+
+
 def test_files_that_find_no_room_are_not_left_out_silently(finished, tmp_path):
     """A town's map, say: a link that leads beside the page would lead nowhere."""
     run = shutil.copytree(finished, tmp_path / "run")

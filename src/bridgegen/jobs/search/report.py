@@ -138,10 +138,9 @@ def write_finding_page(
         StorageError: not a run, or the file cannot be written.
     """
     run = Run(folder)
-    if name is None:
-        if not (exported := run.exported()):
-            raise InputError(f"{folder}: no scenario was exported")
-        name = exported[0].name
+    if not (exported := run.exported()):
+        raise InputError(f"{folder}: no critical scenario was exported, so there is none to send")
+    name = name or exported[0].name
     out = out or Path(f"{run.folder.resolve().name}-{name}.html")
     refuse_other(out, "bridgegen search", "page")
     pipeline = pipeline_of(run, "export", ego=ego)
