@@ -116,6 +116,7 @@ def test_its_files_are_saved_from_it_and_do_the_same_again(browser, sent, finish
     page.wait_for_function("window.bridgegen?.state()?.scenario === '0002'")
     seen = page.locator("main > section:visible").evaluate_all("all => all.map((one) => one.id)")
     assert seen == ["scenarios", "summary", "made-of", "provenance"]
+    assert page.inner_text("#summary-title") == "The search that found it"
     assert page.locator(".send").count() == 0
     for kind in ("xosc", "xodr"):
         with page.expect_download() as download:

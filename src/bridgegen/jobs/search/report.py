@@ -110,7 +110,7 @@ def finding_page(pipeline: Pipeline, run: Run, rows: Rows | Recorded, name: str)
         text, "fails" if playback.critical else "", "FAILS" * playback.critical, command
     )
     trail = ["crash", f"scenario {name} of {run.folder.resolve().name}"]
-    page = report_page(data, verdict=banner, trail=trail, alone=True)
+    page = report_page(data, verdict=banner, trail=trail)
     held = packed_files(files)["names"]
     if len(page) > MOST_SENT or len(held) < len(files):
         kinds = joined([f"{path} ({len(text):,} bytes)" for path, text in files.items()])

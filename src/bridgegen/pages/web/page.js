@@ -30,6 +30,7 @@ function listScenarios() {
 function showAlone() {
   $("kept").classList.add("alone");
   $("list").hidden = true;
+  $("summary-title").textContent = "The search that found it";
   begin(new Opener(hook));
 }
 
