@@ -12,7 +12,7 @@ import pytest
 from bridgegen.pages import page
 from bridgegen.pages.page import Module, ModuleError, bundle, in_order
 
-ENTRIES = (*page.SERVED, "show.js", "runs.js", "suite.js", "trial.js")
+ENTRIES = (*page.SERVED, "show.js", "runs.js", "status.js", "suite.js", "trial.js")
 OURS = {
     file.name: Module(file.name, file.read_text("utf-8"))
     for file in page.WEB.iterdir()
@@ -131,7 +131,7 @@ GLOBALS = {*re.findall(r"\w+", """
     String TextDecoder TypeError URL Uint8Array addEventListener atob clearTimeout
     decodeURIComponent document encodeURIComponent fetch getComputedStyle history innerHeight
     innerWidth localStorage location matchMedia navigator performance Promise
-    requestAnimationFrame setTimeout window
+    requestAnimationFrame sessionStorage setTimeout window
 """)}  # fmt: skip
 TOKEN = re.compile(
     r"""(?P<skip>\s+|//[^\n]*|/\*.*?\*/)|(?P<text>"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')"""
@@ -300,7 +300,9 @@ def test_every_module_of_ours_is_used():
     needed = {module.name for module in in_order(page.SERVED, page._text)}
     needed |= {
         module.name
-        for module in in_order(["show.js", "runs.js", "suite.js", "trial.js"], page._text)
+        for module in in_order(
+            ["show.js", "runs.js", "status.js", "suite.js", "trial.js"], page._text
+        )
     }
     assert needed == {*OURS} - {"theme.js"}  # a script of its own, in every page
 

@@ -16,7 +16,7 @@ from bridgegen.pages.page import write_report
 from bridgegen.pages.payload import to_json
 from bridgegen.pages.sections import SECTIONS
 
-SCRIPTED = ("show", "runs", "suite")
+SCRIPTED = ("show", "suite")
 VOID = {"meta", "link", "input", "br", "img", "hr"}
 
 

@@ -15,13 +15,13 @@ from bridgegen.cli.verdict.of_difference import DifferenceCriteria
 from bridgegen.cli.verdict.of_run import PassFailCriteria
 from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
 from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.dashboard.home import Home
 from bridgegen.jobs.suite.difference import DriverDifference, difference
 from bridgegen.jobs.suite.entries import RESULTS
 from bridgegen.jobs.suite.known_failures import KnownFailures
 from bridgegen.jobs.suite.replay import replay
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.suite import SuiteRun, evaluate_suite, read_suite
-from bridgegen.jobs.view.folder_view import FolderView
 from bridgegen.results.failures import read_failures, write_failures
 
 DOUBLE_PARKED = Path(__file__).parents[1] / "campaign" / "double-parked.yaml"
@@ -299,7 +299,7 @@ def test_a_safety_case_of_a_run_that_is_not_judged_ends_with_3(cli, stuck_run, t
 
 
 def test_a_list_of_runs_does_not_say_that_it_has_no_failures(stuck_run):
-    view = FolderView(stuck_run.folder.parent)
+    view = Home(stuck_run.folder.parent)
     assert b'"unjudged":true' in view.page().replace(b" ", b"")
     pair = (view.pair(0, 0) or b"").replace(b"\n", b"")
     assert b"<td>not judged</td>" in pair

@@ -15,8 +15,9 @@ from tests.approval import approve, refuses
 
 import bridgegen as bg
 from bridgegen.base.errors import StorageError
+from bridgegen.jobs.dashboard.home import Home
 from bridgegen.jobs.view import folder_view
-from bridgegen.jobs.view.folder_view import FolderView, _by_key, _count
+from bridgegen.jobs.view.folder_view import _by_key, _count
 from bridgegen.jobs.view.overview import DEEPEST, find_runs, read_line
 from bridgegen.jobs.view.server import Server, answer
 from bridgegen.results.store import Store
@@ -47,7 +48,7 @@ def listed(page: bytes) -> dict[str, dict]:
 
 
 def test_it_lists_every_run_with_what_is_known_of_it(runs, finished):
-    found = listed(FolderView(runs).page())
+    found = listed(Home(runs).page())
     assert list(found) == ["damaged", "new", "s4", "week 2/again"]
     triage = json.loads((finished / "triage.json").read_text("utf-8"))
     with sqlite3.connect(finished / "run.sqlite") as connection:
@@ -68,7 +69,7 @@ def test_it_lists_every_run_with_what_is_known_of_it(runs, finished):
 
 
 def test_a_damaged_run_is_listed_with_the_reason_and_the_others_are_shown(runs):
-    site = FolderView(runs)
+    site = Home(runs)
     found = listed(site.page())
     assert "run.sqlite" in found["damaged"]["problem"]
     assert answer(site, f"/run/{found['s4']['number']}/").status == 200
@@ -78,7 +79,7 @@ def test_a_damaged_run_is_listed_with_the_reason_and_the_others_are_shown(runs):
 
 
 def test_each_run_s_page_news_and_files_are_below_its_number(runs):
-    site = FolderView(runs)
+    site = Home(runs)
     number = listed(site.page())["s4"]["number"]
     assert b"<title>crossroads-s4" in answer(site, f"/run/{number}/").body
     assert json.loads(answer(site, f"/run/{number}/news?after=0").body)["finished"]
@@ -92,16 +93,16 @@ def test_each_run_s_page_news_and_files_are_below_its_number(runs):
      "/pair?first=0&second=99", "/s4/run.sqlite", "/run/2/../../etc/passwd", "/run/2/run.sqlite"],
 )  # fmt: skip
 def test_nothing_else_is_there(runs, path):
-    assert answer(FolderView(runs), path).status == 404
+    assert answer(Home(runs), path).status == 404
 
 
 @given(st.text())
 def test_no_path_at_all_breaks_it(runs, path):
-    assert answer(FolderView(runs), path).status in (200, 404, 500)
+    assert answer(Home(runs), path).status in (200, 404, 500)
 
 
 def test_two_runs_side_by_side_match_their_failure_modes(runs):
-    site = FolderView(runs)
+    site = Home(runs)
     found = listed(site.page())
     a, b = found["s4"]["number"], found["week 2/again"]["number"]
     page = answer(site, f"/pair?first={a}&second={b}").body.decode()
@@ -131,7 +132,7 @@ def test_two_modes_of_one_kind_in_a_run_are_counted_together():
 
 def test_few_runs_are_open_at_a_time(runs, monkeypatch):
     monkeypatch.setattr(folder_view, "MOST_OPEN", 1)
-    site = FolderView(runs)
+    site = Home(runs)
     found = listed(site.page())
     first, second = (found[name]["number"] for name in ("s4", "week 2/again"))
     kept = site.run(first)
@@ -151,7 +152,7 @@ class Tags(HTMLParser):
 
 def test_a_hostile_name_is_text(finished, tmp_path):
     shutil.copytree(finished, tmp_path / "x" / HOSTILE.replace("/", ""))
-    site = FolderView(tmp_path / "x")
+    site = Home(tmp_path / "x")
     for page in (site.page(), answer(site, "/pair?first=0&second=0").body):
         tags = Tags()
         tags.feed(page.decode())
@@ -179,7 +180,7 @@ def test_a_line_of_the_list_reads_no_rows(finished, monkeypatch):
 
 def test_a_folder_without_runs_is_one_clear_error(tmp_path, cli):
     with refuses(StorageError):
-        FolderView(tmp_path)
+        Home(tmp_path)
     code, _, said = cli("open", str(tmp_path))
     assert code != 0
     approve(said, "contains")
@@ -193,7 +194,7 @@ def test_options_of_one_run_are_refused_for_a_folder_of_runs(runs, cli):
 
 @pytest.mark.browser
 def test_runs_are_filtered_sorted_and_two_of_them_play_side_by_side(browser, runs):
-    server = Server(FolderView(runs))
+    server = Server(Home(runs))
     server.start()
     page = browser.new_page(viewport={"width": 1440, "height": 900})
     complaints: list[str] = []
@@ -222,7 +223,7 @@ def test_runs_are_filtered_sorted_and_two_of_them_play_side_by_side(browser, run
         frame.wait_for_function("window.bridgegen?.state()?.playing")
     assert len(page.frames) == 3
     page.click("text=All runs")
-    page.wait_for_url(server.url)
+    page.wait_for_url(f"{server.url}#searches")
     page.click("text=week 2/again")
     page.wait_for_url(re.compile("/run/"))
     page.wait_for_function("bridgegen.state() !== null")
@@ -238,7 +239,7 @@ def test_a_run_that_violates_a_criterion_is_not_listed_as_without_failure(tmp_pa
         out=tmp_path / "runs" / "a",
         criteria=["R-12: always(gap to bv > 2 m)", "R-14: n_collision == 0"],
     )  # fmt: skip
-    run = listed(FolderView(tmp_path / "runs").page())["a"]
+    run = listed(Home(tmp_path / "runs").page())["a"]
     violated = bg.Run(tmp_path / "runs" / "a").criteria[0].violated
     approve(run["judged"], "12", violated)
     assert run["violated"]
@@ -247,5 +248,5 @@ def test_a_run_that_violates_a_criterion_is_not_listed_as_without_failure(tmp_pa
 
 
 def test_a_run_without_criteria_says_nothing_of_them(runs):
-    run = listed(FolderView(runs).page())["s4"]
+    run = listed(Home(runs).page())["s4"]
     assert (run["judged"], run["violated"]) == ("", False)

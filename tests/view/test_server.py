@@ -33,6 +33,9 @@ class Site:
     def file(self, name: str) -> bytes | None:
         return b"<xml/>" if name == "critical/0001.xosc" else None
 
+    def finding(self, name: str) -> bytes | None:
+        return b"<p>one crash</p>" if name == "0001" else None
+
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:

@@ -5,6 +5,7 @@ import pytest
 from tests.approval import approve
 
 from bridgegen.cli.terminal.view import _redirect
+from bridgegen.jobs.dashboard.home import Home
 from bridgegen.jobs.view.run_view import RunView
 from bridgegen.jobs.view.server import Server
 from bridgegen.results.confirmation.record import Outcome, Record, Scenario, digest_of, write_record
@@ -172,3 +173,35 @@ def test_what_is_confirmed_meanwhile_is_offered(opened, growing):
     page.wait_for_function("window.bridgegen?.data.confirmations.length === 1")
     assert "None of 1 scenarios ran in esmini 3.6." in page.inner_text("#elsewhere")
     assert page.complaints == []
+
+
+def test_a_project_s_home_shows_how_its_searches_go_on(browser, growing):
+    growing.grow(60)
+    server = Server(Home(growing.folder.parent))
+    server.start()
+    page = browser.new_page()
+    complaints: list[str] = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(server.url)
+    critical = growing.rows.critical
+    page.locator("#growing").get_by_text(
+        f"60 of 120 evaluations, {critical[:60].sum()} critical"
+    ).wait_for()
+    growing.grow(40)
+    page.locator("#growing").get_by_text(
+        f"100 of 120 evaluations, {critical[:100].sum()} critical"
+    ).wait_for()
+    assert "not finished: 100 of 120" in page.inner_text("#runs")
+    page.click("#growing a")
+    page.wait_for_url("**/run/0/")
+    page.wait_for_selector("#live-text:has-text('100 of 120')")
+    page.click("a.brand")
+    page.wait_for_url(server.url)
+    growing.grow(20)
+    growing.end()
+    page.locator("#growing").wait_for(state="hidden")  # it loads again
+    assert "not finished" not in page.inner_text("#runs")
+    assert complaints == []
+    page.close()
+    server.shutdown()
+    server.server_close()

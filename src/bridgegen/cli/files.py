@@ -19,6 +19,7 @@ from bridgegen.engine.options.forms import read_names
 _OF_FLAVOUR = {
     "parquet": {"sample"},
     "video": {"evaluation", "size", "fps", "start", "end", "ego"},
+    "page": {"scenarios", "ego"},
     "xosc": set[str](),
 }
 """Options of the flavours that are no OpenSCENARIO of a run's scenarios."""
@@ -40,7 +41,8 @@ def export(
         typer.Option(
             help="1.2 or 1.3: with parameters; resolved: without; recorded: timed trajectories; "
             "carla: 1.0 for ScenarioRunner, timed trajectories for all but the ego; video: a film; "
-            "parquet: all evaluations as tables; xosc: OpenDRIVE and OpenSCENARIO of individuals.",
+            "page: one crash with its player and files as one page to send; parquet: all "
+            "evaluations as tables; xosc: OpenDRIVE and OpenSCENARIO of individuals.",
             autocompletion=completing("flavour"),
         ),
     ],
@@ -56,8 +58,9 @@ def export(
         Path | None,
         typer.Option(
             help="Folder for the files; of a film the file: .gif, .webp, .mp4, .webm; or .png or "
-            ".svg for one picture.",
-            show_default="SOURCE/export/FLAVOUR; here RUN-SCENARIO.gif; tables; beside the .owl",
+            ".svg for one picture; of a page .html.",
+            show_default="SOURCE/export/FLAVOUR; here RUN-SCENARIO.gif or .html; tables; beside "
+            "the .owl",
         ),
     ] = None,
     town: Annotated[
@@ -114,6 +117,7 @@ def export(
     """
     from bridgegen.jobs.search.export import FLAVOURS
     from bridgegen.jobs.search.export import export as export_scenarios
+    from bridgegen.jobs.search.report import write_finding_page
     from bridgegen.jobs.search.table import write_tables
     from bridgegen.jobs.search.video import film
     from bridgegen.openx.convert import convert_file
@@ -139,6 +143,11 @@ def export(
         if size is not None:
             given["size"] = _size(size)
         written = [film(sources[0], out, **given)]
+    elif flavour == "page":
+        if len(scenarios or ()) > 1:
+            raise InputError("--flavour page takes one --scenario: one crash is sent in one page")
+        name = scenarios[0] if scenarios else None
+        written = [write_finding_page(sources[0], name, out, ego=ego)]
     elif flavour == "xosc":
         written, notes = convert_file(sources[0], out)
     else:

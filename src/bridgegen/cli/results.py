@@ -27,9 +27,10 @@ def view(
     run: Annotated[
         Path,
         typer.Argument(
-            metavar="FOLDER", help="The folder of a run, which may still grow; or of many runs."
+            metavar="FOLDER",
+            help="A project: a folder with results; or a run, which may still grow.",
         ),
-    ],
+    ] = Path(),
     port: Annotated[
         int, typer.Option(help="TCP port of the local server.", show_default="any free one")
     ] = 0,
@@ -40,13 +41,14 @@ def view(
     ego: options.OwnEgo = None,
     connection: Connection = NO_CONNECTION,
 ) -> None:
-    """Serve a run's report in the browser, or a list of runs.
+    """Open a project or a run in the browser.
 
-    A report updates while the search runs, and plays any scenario of the run. Of a folder that
-    holds runs, the page lists them, leads to their reports and shows two side by side.
+    A project's home page has its verdict, all runs and other results, the dashboard, and searches
+    as they run. The status and comment of a failure mode are set by click, and kept in
+    failures.yaml. A run's report updates while the search runs, and plays any of its scenarios.
     """
     from bridgegen.cli.terminal.view import serve
-    from bridgegen.jobs.view.folder_view import FolderView
+    from bridgegen.jobs.dashboard.home import Home
     from bridgegen.jobs.view.overview import is_run
     from bridgegen.jobs.view.run_view import RunView
     from bridgegen.jobs.view.server import Server
@@ -57,7 +59,7 @@ def view(
             raise InputError(
                 f"{run}: holds no run itself: --evaluation, --ego and --simulator are for one run"
             )
-        serve(Server(FolderView(run), port), browser=browser)
+        serve(Server(Home(run), port), browser=browser)
         return
     site = RunView(run, ego=ego, simulator=access)
     fragment = "" if evaluation is None else site.fragment(evaluation)

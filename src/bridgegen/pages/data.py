@@ -5,7 +5,7 @@ time to collision); the page shows a dash there.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -262,6 +262,7 @@ class ReportData:
         screened: how far the run's screen agrees, as `screened_payload` returns it.
         happening: which events began, and who came near the ego, if the run recorded it.
         simulation: what the page simulates with; see `simulation_payload`. None: it does not.
+        alone: whether the page is about its only exported scenario, see `only`.
     """
 
     summary: RunSummary
@@ -280,6 +281,7 @@ class ReportData:
     screened: Mapping[str, Any] | None = None
     happening: Happening | None = None
     simulation: Mapping[str, Any] | None = None
+    alone: bool = False
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size
@@ -289,3 +291,29 @@ class ReportData:
                     f"evaluation of playback '{playback.name}' must be in 0..{n - 1}, "
                     f"got {playback.evaluation}"
                 )
+
+
+def only(data: ReportData, name: str) -> ReportData | None:
+    """Return the data of a report on one of its exported scenarios; None if there is none such.
+
+    The page then has its row, motion and files; the rest of the run is in its figures alone.
+    """
+    kept = tuple(playback for playback in data.kept if playback.name == name)
+    if not kept:
+        return None
+    return replace(
+        data,
+        kept=kept,
+        coverage=None,
+        notes=(),
+        regions=None,
+        more=(),
+        files={path: text for path, text in data.files.items() if path in kept[0].files},
+        confirmations=(),
+        triage=None,
+        minimal=(),
+        drawn=(),
+        screened=None,
+        happening=None,
+        alone=True,
+    )

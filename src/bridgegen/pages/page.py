@@ -1,7 +1,7 @@
 """Assembles the page: template, style, scripts and the data, in one file."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib.resources import files
@@ -167,7 +167,7 @@ WEB = files("bridgegen.pages").joinpath("web")
 REPORT = (*(section.module for section in SECTIONS), "page.js")
 """Modules of the report, besides those that they import."""
 
-SERVED = ("motion.js", *REPORT, "live.js")
+SERVED = ("motion.js", *REPORT, "live.js", "status.js")
 """Modules of a served report; a page on disk makes no requests."""
 
 
@@ -182,19 +182,23 @@ def write_report(path: Path, data: ReportData) -> None:
     write_whole(Path(path), [report_page(data)])
 
 
-def report_page(data: ReportData, *, live: bool = False) -> bytes:
+def report_page(
+    data: ReportData, *, live: bool = False, also: Mapping[str, Any] | None = None, **more: Any
+) -> bytes:
     """Return the report as HTML.
 
     Args:
         data: of the report.
         live: whether ``bridgegen open`` serves it, so that it can request updates.
+        also: what its data hold besides, by key.
+        **more: values of the template: "home", "verdict", "trail".
     """
     title = f"{data.summary.scenario}: {data.summary.title}"
     modules, connect = (SERVED, "self") if live else (REPORT, "none")
     # The data are cut to what the code leaves of the page's size.
-    code = len(_page("page.html", modules, title, "", connect=connect))
-    text = to_json(data, live=live, code=code)
-    return _page("page.html", modules, title, text, connect=connect)
+    code = len(_page("page.html", modules, title, "", connect=connect, **more))
+    text = to_json(data, live=live, code=code, also=also)
+    return _page("page.html", modules, title, text, connect=connect, **more)
 
 
 def write_page(path: Path, entry: str, title: str, data: str, **more: Any) -> None:

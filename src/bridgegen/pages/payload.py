@@ -6,6 +6,7 @@ number that is NaN or infinite becomes null.
 
 import json
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -34,15 +35,22 @@ ROWS = 20_000
 """Maximum number of rows on the page, evenly spread; the iterations include all rows."""
 
 
-def to_json(data: ReportData, *, live: bool = False, code: int = 0) -> str:
+def to_json(
+    data: ReportData,
+    *,
+    live: bool = False,
+    code: int = 0,
+    also: Mapping[str, Any] | None = None,
+) -> str:
     """Return the page's data as JSON that is safe inside a ``<script>`` element.
 
     Args:
         data: of the report.
         live: whether the page may request updates from its server.
         code: see `payload`.
+        also: what it holds besides, by key.
     """
-    return script_json({**payload(data, code), "live": live})
+    return script_json({**payload(data, code), "live": live, **(also or {})})
 
 
 def script_json(value: Any) -> str:
@@ -83,8 +91,11 @@ def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
     wanted += [mode.shown for mode in modes]
     wanted += [criterion.at - 1 for criterion in data.criteria if criterion.at is not None]
     shown = _shown(data.evaluations, wanted)
+    if data.alone:
+        shown = np.isin(np.arange(shown.size), wanted[:1])
     page = {
         "live": False,
+        "alone": data.alone,
         "summary": _summary(data),
         **_of_rows(data, shown),
         "minimal": packed_motions(data.minimal, index, SIZE, of_rows=False),

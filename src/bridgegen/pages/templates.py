@@ -112,6 +112,7 @@ class Cell:
         before: plain text before the link.
         mark: a sign before the text that a screen reader does not say, and its class.
         code: a formula below the text.
+        mode: id of the failure mode whose status the text is.
         links: address, text and label of further links, below it.
         more: after these.
     """
@@ -124,6 +125,7 @@ class Cell:
     before: str = ""
     mark: tuple[str, str] | None = None
     code: str = ""
+    mode: str = ""
     links: Sequence[tuple[str, str, str]] = ()
     more: str = ""
 

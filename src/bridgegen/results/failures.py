@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import BeforeValidator, Field
 
-from bridgegen.base.disk import write_whole
+from bridgegen.base.disk import locked, write_whole
 from bridgegen.base.errors import FileFormatError, InputError, StorageError
 from bridgegen.scenario.language.criteria import CriterionSection, read_criterion
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES, Document, read_plain_yaml
@@ -48,6 +48,10 @@ _OWN = ("status", "comment")
 """The keys that people write."""
 _OPTIONAL = (*_OWN, "minimal", "violates", "count", "seed")
 """The keys that the block of a suite may lack."""
+
+
+class ChangedError(StorageError):
+    """The file was changed after it was read: nothing is written."""
 
 
 class Failure(ShapedSection):
@@ -194,6 +198,7 @@ def write_failures(file: FailureFile, changed: Mapping[str, Failure]) -> None:
         changed: by id.
 
     Raises:
+        ChangedError: it is not what was read any more.
         StorageError: it cannot be written.
         FileFormatError: it is laid out so that no block can be added, or would be too large.
     """
@@ -216,7 +221,11 @@ def write_failures(file: FailureFile, changed: Mapping[str, Failure]) -> None:
             f"{file.path}: no block can be added to it as it is laid out; write each failure as "
             f"lines of its own below 'failures:', and nothing behind the last{why}"
         )
-    write_whole(file.path, [data])
+    with locked(file.path.parent):
+        # People edit it, too: what they saved since it was read stays.
+        if read_failures(file.path.parent).text != file.text:
+            raise ChangedError(f"{file.path}: was changed meanwhile; nothing is written: try again")
+        write_whole(file.path, [data])
 
 
 def failure_of(

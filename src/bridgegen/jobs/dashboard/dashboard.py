@@ -1,7 +1,7 @@
 """A dashboard: what a project's results say together, and the page that shows it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from bridgegen.results.failures import (
     FILE,
     OLD_FILE,
     Failure,
+    FailureFile,
     read_failures,
     read_old_file,
     write_failures,
@@ -250,10 +251,7 @@ def build_dashboard(given: DashboardOptions) -> Dashboard:
 
     folder, update = Path(given.folder), given.update
     page = folder / PAGE if given.out is None else Path(given.out)
-    status_path = folder / FILE
     file, old = read_failures(folder), read_old_file(folder)
-    # The newer file counts where both name a failure mode.
-    own = {**old, **file.failures}
     declared = tuple(map(read_criterion, given.criteria))
     # Before the results are read, which may take long.
     refuse_other(page, GENERATOR, "dashboard")
@@ -264,32 +262,53 @@ def build_dashboard(given: DashboardOptions) -> Dashboard:
         damaged := [problem.why for problem in project.problems if problem.place.endswith(FILE)]
     ):
         raise FileFormatError(*damaged)  # it may name modes that seem to be new
-    modes = failure_modes(project.results, decisions_of(own, project))
+    found = dashboard_of(project, page, file, old, declared)
     # Without --update nothing is written but the page, so that a nightly job leaves the working
     # tree clean.
-    new = {} if not update else undecided(modes, own)
+    new = {} if not update else undecided(found.modes, found.own)
     # Also what an earlier version's file holds: it moves to the new file at the first update.
     moved = {id: failure for id, failure in old.items() if id not in file.failures}
     if update and (new or moved):
         write_failures(file, {**moved, **new})
-    notes = contradictions(modes, own)
     if old:
-        notes.append(_note(folder / OLD_FILE, moved=bool(moved), update=update))
-    found = Dashboard(
+        note = _note(folder / OLD_FILE, moved=bool(moved), update=update)
+        found = replace(found, notes=(*found.notes, note))
+    found = replace(found, added=len(new), status_path=folder / FILE)
+    write_page(found)
+    return found
+
+
+def dashboard_of(
+    project: Project,
+    page: Path,
+    file: FailureFile,
+    old: Mapping[str, Failure],
+    declared: tuple[Criterion, ...] = (),
+) -> Dashboard:
+    """Return what the results of a project say together; nothing is written.
+
+    Args:
+        project: with all that was read.
+        page: path of the page.
+        file: the statuses of the project's folder.
+        old: those of a file of an earlier version.
+        declared: requirements that are named for the project.
+    """
+    # The newer file counts where both name a failure mode.
+    own = {**old, **file.failures}
+    modes = failure_modes(project.results, decisions_of(own, project))
+    return Dashboard(
         project,
         page,
         own,
-        status_path,
+        file.path,
         tuple(modes),
         tuple(matrices(project.results, declared)),
         declared,
         tuple(trends(project.runs, project.suites)),
         coverage(project.results, project.sceneries),
-        len(new),
-        tuple(notes),
+        notes=tuple(contradictions(modes, own)),
     )
-    write_page(found)
-    return found
 
 
 def _note(old: Path, *, moved: bool, update: bool) -> str:

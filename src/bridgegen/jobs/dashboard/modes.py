@@ -202,9 +202,9 @@ def undecided(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> dict[str, 
     """Return blocks for the failure modes that no block is about, by id."""
     return {
         mode.key.id: Block(
-            title=_clean(mode.title),
-            scenario=_clean(mode.key.scenario),
-            driver=_clean(mode.key.driver),
+            title=cleaned(mode.title),
+            scenario=cleaned(mode.key.scenario),
+            driver=cleaned(mode.key.driver),
         )
         for mode in modes
         # Blocks that are there are never changed: the file is the user's, and belongs into git.
@@ -224,7 +224,7 @@ def contradictions(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> list[
     ]
 
 
-def _clean(text: str) -> str:
+def cleaned(text: str) -> str:
     """Return a text, which may come from a stranger's file, as a block takes it."""
     # A title may come from a stranger's file: a control character would change what a terminal or
     # an editor shows.

@@ -7,6 +7,7 @@ from typing import Any
 from urllib.parse import quote
 
 from bridgegen.assess.criteria import margin_in_words
+from bridgegen.base.disk import write_whole
 from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
 from bridgegen.jobs.dashboard.odd import Coverage, Covered
@@ -49,23 +50,32 @@ def write_page(found: Dashboard) -> None:
     Raises:
         StorageError: it cannot be written.
     """
+    write_whole(found.page, [page_of(found)])
+
+
+def page_of(found: Dashboard, **served: Any) -> bytes:
+    """Return the page.
+
+    Args:
+        found: what it shows.
+        served: further values of the template where ``bridgegen open`` serves it.
+    """
     name = found.project.folder.name
     base = os.path.relpath(found.project.folder, found.page.resolve().parent).replace(os.sep, "/")
     again = [trend for trend in found.trends if len(trend.points) > 1]
     partly = {scenery.partly for scenery in found.coverage.sceneries.values() if scenery.partly}
-    templates.write_page(
-        found.page,
+    return templates.page(
         "jobs/dashboard/page.html",
         title=f"{name or 'project'}: dashboard",
         heading=name or "Project",
         generator=GENERATOR,
         facts=[*_facts(found)],
         problems=found.project.problems,
-        verdict=_banner(found),
+        verdict=banner(found),
         file=FILE,
         notes=found.notes[:MOST_RESULTS],
-        modes=_modes("Failure modes of current results", found.failing, base),
-        before=_modes(
+        modes=modes_table("Failure modes of current results", found.failing, base),
+        before=modes_table(
             "Failure modes of earlier results",
             [mode for mode in found.modes if not mode.fails_now],
             base,
@@ -104,10 +114,12 @@ def write_page(found: Dashboard) -> None:
             [[problem.place, problem.why] for problem in found.project.problems],
         ),
         open=OPEN,
+        **served,
     )
 
 
-def _banner(found: Dashboard) -> Banner:
+def banner(found: Dashboard) -> Banner:
+    """Return the verdict on the project."""
     text = " ".join(filter(None, (failing_sentence(found), requirements_sentence(found))))
     if found.failing or found.violated:
         return Banner(text, "fails", "FAILS")
@@ -170,7 +182,8 @@ def within(sizes: Iterable[int], most: int) -> int:
 # --- Failure modes: what fails now, what failed before ---
 
 
-def _modes(name: str, some: Sequence[OpenMode], base: str) -> Table:
+def modes_table(name: str, some: Sequence[OpenMode], base: str) -> Table:
+    """Return failure modes as a table; its links begin with ``base``."""
     heads = ("failure mode", "status", "scenario", "driver", "evaluations", "MAIS3+", "last seen")
     return _table(name, heads, [_mode(mode, base) for mode in some], MOST_MODES)
 
@@ -182,9 +195,9 @@ def _mode(open_mode: OpenMode, base: str) -> Row:
     more = len(open_mode.results) - MOST_RESULTS
     return [
         Cell(open_mode.title, notes),
-        Cell("fixed, but fails again", kind="status regression")
+        Cell("fixed, but fails again", kind="status regression", mode=open_mode.key.id)
         if open_mode.is_regression
-        else Cell(open_mode.status, kind=f"status {open_mode.status}"),
+        else Cell(open_mode.status, kind=f"status {open_mode.status}", mode=open_mode.key.id),
         open_mode.key.scenario,
         (open_mode.key.driver, joined(open_mode.versions, 6)),
         open_mode.count,

@@ -102,7 +102,7 @@ def read_project(folder: Path, begun: Callable[[int, int], None] | None = None) 
     return reader.project()
 
 
-def _kind(folder: Path) -> str | None:
+def kind_of(folder: Path) -> str | None:
     """Return the file that identifies a folder of results; None if it is another folder."""
     for name in _FILES:
         file = folder / name
@@ -128,13 +128,13 @@ class _Reader:
         file = folder / FAILURES
         if file.is_file() and not file.is_symlink():
             self.deciding.append(folder)
-        return _kind(folder) is not None
+        return kind_of(folder) is not None
 
     def read(self, folder: Path) -> None:
         """Read a folder; what is wrong with it is a problem of the project."""
         place = folder.relative_to(self.root).as_posix()
         try:
-            kind = _kind(folder)
+            kind = kind_of(folder)
             if kind == RUN_FILE:
                 self.runs.append(read_run(self.root, folder, self.sceneries))
             elif kind == SUITE_FILE:

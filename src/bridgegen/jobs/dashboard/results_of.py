@@ -102,20 +102,24 @@ def violations(judged: tuple[Judged, ...], scenario: str, driver: str) -> Iterat
             yield Failure(key, f"violates {item.criterion.id}: {words}", item.violated)
 
 
+def key_of(mode: Mode, scenario: str, driver: Driver) -> ModeKey:
+    """Return what a failure mode of a run has in common with the same one of other results."""
+    return ModeKey(
+        scenario,
+        driver.name,
+        mode.conflict,
+        mode.conflict_type,
+        mode.responsible,
+        mode.partner,
+        mode.place,
+    )
+
+
 def _failures(line: RunLine, scenario: str, driver: Driver) -> Iterator[Failure]:
     """Yield the failure modes of a run; those that differ in cause or cluster alone are one."""
     held: dict[ModeKey, list[Mode]] = {}
     for mode in line.modes:
-        key = ModeKey(
-            scenario,
-            driver.name,
-            mode.conflict,
-            mode.conflict_type,
-            mode.responsible,
-            mode.partner,
-            mode.place,
-        )
-        held.setdefault(key, []).append(mode)
+        held.setdefault(key_of(mode, scenario, driver), []).append(mode)
     for key, modes in held.items():
         yield Failure(
             key,

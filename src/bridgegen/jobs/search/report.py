@@ -4,15 +4,19 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from bridgegen.base.disk import read_inside
+from bridgegen.base.disk import read_inside, refuse_other, write_whole
+from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.replays import Replays
 from bridgegen.jobs.search.exported import FOLDER, MINIMAL, Exported
+from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.settings import Settings
 from bridgegen.pages.build import build_report
-from bridgegen.pages.data import WHOLE, ReportData
-from bridgegen.pages.page import write_report
+from bridgegen.pages.data import WHOLE, ReportData, only
+from bridgegen.pages.packed import packed_files
+from bridgegen.pages.page import report_page, write_report
+from bridgegen.pages.templates import Banner, joined
 from bridgegen.results.confirmation.record import read_records
 from bridgegen.results.store import Recorded, Rows, Store
 from bridgegen.search.regions.record import JSON_FILE, read_record
@@ -20,6 +24,10 @@ from bridgegen.search.triage.fresh import FRESH, failing_draws
 from bridgegen.search.triage.record import JSON_FILE as TRIAGE_FILE
 from bridgegen.search.triage.record import Triage
 from bridgegen.search.triage.record import read_record as read_triage
+from bridgegen.simulation.choice import EMBEDDED
+
+MOST_SENT = 1_000_000
+"""Maximum length of a page that is sent [bytes]: what any mail and any tracker takes."""
 
 
 def rewrite_report(run: Run, pipeline: Pipeline, stage: Callable[[str], None]) -> tuple[Path, ...]:
@@ -66,6 +74,81 @@ def write_run_report(
     data = run_data(pipeline, run, rows, exported, files=files, more=True, replays=replays)
     write_report(run.report, data)
     return run.report
+
+
+def finding_page(pipeline: Pipeline, run: Run, rows: Rows | Recorded, name: str) -> bytes:
+    """Return the report on one exported scenario: a file to send, with all that it is made of.
+
+    Args:
+        pipeline: the run's.
+        run: as these rows stand.
+        rows: all of it, in order.
+        name: of the scenario ("0007").
+
+    Raises:
+        UnknownNameError: no such scenario was exported.
+        InputError: the page would exceed `MOST_SENT`.
+    """
+    exported = run.exported(len(rows))
+    files = {
+        path: read_inside(run.folder, path)
+        for item in exported
+        if item.name == name
+        for path in item.files
+    }
+    data = only(run_data(pipeline, run, rows, exported, coverage=True, files=files), name)
+    if data is None:
+        raise UnknownNameError(f"scenario of {run.folder}", name, [item.name for item in exported])
+    (playback,) = data.kept
+    given = ["--ego", pipeline.driver.name] if pipeline.driver.is_own else []
+    simulator = run.settings.simulator.name
+    given += ["--simulator", simulator] if simulator != EMBEDDED.name else []
+    found = playback.conflict.summary.bare if playback.conflict else f"Scenario {name}"
+    text = f"{found[:1].upper()}{found[1:]}. Save its files from this page and simulate them:"
+    command = shlex.join(["bridgegen", "simulate", f"{name}.xosc", *given])
+    banner = Banner(
+        text, "fails" if playback.critical else "", "FAILS" * playback.critical, command
+    )
+    trail = ["crash", f"scenario {name} of {run.folder.resolve().name}"]
+    page = report_page(data, verdict=banner, trail=trail)
+    held = packed_files(files)["names"]
+    if len(page) > MOST_SENT or len(held) < len(files):
+        kinds = joined([f"{path} ({len(text):,} bytes)" for path, text in files.items()])
+        raise InputError(
+            f"{run.folder}: scenario {name} is too large for a page of {MOST_SENT:,} bytes: {kinds}"
+            f"; send its files: bridgegen export {run.folder} --flavour resolved --scenario {name}"
+        )
+    return page
+
+
+def write_finding_page(
+    folder: Path, name: str | None = None, out: Path | None = None, *, ego: str | None = None
+) -> Path:
+    """Write the report on one exported scenario as one file that can be sent; return the file.
+
+    Args:
+        folder: of the run.
+        name: of the scenario; by default the most critical one.
+        out: the page (.html); by default ``RUN-SCENARIO.html``, here.
+        ego: where a driver of the user's drives, that same driver.
+
+    Raises:
+        UnknownNameError: no such scenario was exported.
+        InputError: the run has exported none, or the page would be too large.
+        StorageError: not a run, or the file cannot be written.
+    """
+    run = Run(folder)
+    if not (exported := run.exported()):
+        raise InputError(f"{folder}: no critical scenario was exported, so there is none to send")
+    name = name or exported[0].name
+    out = out or Path(f"{run.folder.resolve().name}-{name}.html")
+    refuse_other(out, "bridgegen search", "page")
+    pipeline = pipeline_of(run, "export", ego=ego)
+    with Store.open(run.folder) as store:
+        rows = Recorded(store, whole=(*WHOLE, *pipeline.monitor.names))
+        page = finding_page(pipeline, Run.of(store, rows), rows, name)
+    write_whole(out, [page])
+    return out
 
 
 def run_data(

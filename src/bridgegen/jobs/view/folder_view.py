@@ -1,21 +1,23 @@
-"""A folder of runs as a site: a page that lists them, each run's report, two runs side by side."""
+"""A folder of runs as a site: their facts, each run's report, two runs side by side."""
 
-from collections.abc import Callable, Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from bridgegen.assess.criteria import headline
-from bridgegen.base.errors import StorageError
 from bridgegen.jobs.view.overview import RunLine, find_runs, read_line
 from bridgegen.jobs.view.run_view import RunView
 from bridgegen.pages import templates
-from bridgegen.pages.page import page_of
-from bridgegen.pages.payload import script_json
 from bridgegen.pages.sentences import NARROW, share
+from bridgegen.results.store.run_file import FILE
 from bridgegen.search.triage.record import Mode
 
 MOST_OPEN = 4
 """Maximum number of runs whose rows are in memory."""
+
+STILL = 60.0
+"""Time without a write after which an unfinished run counts as interrupted [s]."""
 
 
 class FolderView:
@@ -23,30 +25,44 @@ class FolderView:
 
     Args:
         folder: of the runs, at any depth.
-
-    Raises:
-        StorageError: it contains no run.
     """
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder).resolve()
         self._runs: list[Path] = []  # by number
         self._views: dict[int, RunView] = {}
+        self._known: dict[int, tuple[tuple[int, int], Mapping[str, Any]]] = {}
         self._find()
-        if not self._runs:
-            raise StorageError(f"{folder}: contains no run, nor does any folder below it")
 
     def _find(self) -> None:
         known = set(self._runs)  # a run keeps its number
         # Appended, never sorted anew: open pages address runs by number.
         self._runs += [run for run in find_runs(self.folder) if run not in known]
 
-    def page(self) -> bytes:
-        """Return the list of all runs, as HTML."""
+    def facts(self) -> list[Mapping[str, Any]]:
+        """Return what the list says of each run, by number."""
         self._find()
-        lines = [_facts(k, read_line(self.folder, run)) for k, run in enumerate(self._runs)]
-        data = script_json({"folder": str(self.folder), "runs": lines})
-        return page_of("runs.js", f"{self.folder.name}: runs", data)
+        return [self._facts(k) for k in range(len(self._runs))]
+
+    def news(self, after: Sequence[int]) -> Mapping[str, Any]:
+        """Return how many runs there are, and the facts of some, by their numbers."""
+        self._find()
+        some = [k for k in after if k < len(self._runs)]
+        return {"total": len(self._runs), "runs": [self._facts(k) for k in some]}
+
+    def _facts(self, number: int) -> Mapping[str, Any]:
+        """Return what the list says of a run; of one that has ended, read once."""
+        run = self._runs[number]
+        try:
+            # A file that replaces another changes the folder's time.
+            mark = run.stat().st_mtime_ns, (run / FILE).stat().st_mtime_ns
+        except OSError:
+            mark = 0, 0
+        known = self._known.get(number)
+        if known is None or known[0] != mark or not known[1]["finished"]:
+            known = mark, _facts(number, read_line(self.folder, run))
+            self._known[number] = known
+        return known[1]
 
     def run(self, number: int) -> RunView | None:
         """Return the site of a run by its number; None if there is none.
@@ -57,6 +73,7 @@ class FolderView:
         if number >= len(self._runs):
             return None
         view = self._views.pop(number, None) or RunView(self._runs[number])
+        view.home = "../../"
         self._views[number] = view  # the latest is the last
         while len(self._views) > MOST_OPEN:
             del self._views[next(iter(self._views))]
@@ -71,6 +88,7 @@ class FolderView:
         return templates.page(
             "jobs/view/pair.html",
             title=f"{a.path} and {b.path}",
+            home="./",
             runs=((first, a), (second, b)),
             rows=rows,
             matched=[*_matched(a, b)],
@@ -91,8 +109,10 @@ def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
         "algorithm": line.algorithm,
         "seed": line.seed,
         "evaluations": line.evaluations,
+        "critical": line.critical,
         "budget": line.budget,
-        "finished": line.finished,
+        "finished": line.finished or bool(line.problem),
+        "grows": not (line.finished or line.problem) and time.time() - line.changed < STILL,
         "modes": len(line.modes) + (line.triage.unrecorded_modes if line.triage else 0),
         "worst": worst.title if worst else "",
         "judged": headline(line.ego, line.criteria),

@@ -31,9 +31,10 @@ class RunLine:
         algorithm: name.
         seed: of the run.
         evaluations: number recorded.
+        critical: number of critical ones.
         budget: number wanted.
         finished: whether it has ended.
-        changed: when its file was last written [s since 1970].
+        changed: when its file, or the log of its writer, was last written [s since 1970].
         size: of its folder on disk [bytes].
         triage: its failure modes; None before it has finished.
         criteria: how its evaluations meet its pass criteria.
@@ -51,6 +52,7 @@ class RunLine:
     algorithm: str = ""
     seed: int = 0
     evaluations: int = 0
+    critical: int = 0
     budget: int = 0
     finished: bool = False
     triage: Triage | None = field(default=None, repr=False)
@@ -118,15 +120,16 @@ def read_line(
     """
     path = run.relative_to(folder).as_posix()
     try:
-        changed = (run / FILE).stat().st_mtime
-    except OSError:
+        # While a search writes, SQLite's log grows beside the file.
+        changed = max(path.stat().st_mtime for path in run.glob(f"{FILE}*"))
+    except (OSError, ValueError):
         changed = 0.0
     size = sum(_sizes(run))
     try:
         with Store.open(run) as store:
             settings, n = Settings.from_dict(store.settings, run), len(store)
             finished, criteria = store.finished is not None, judged(store, settings)
-            version = store.version
+            version, critical = store.version, store.n_critical
             if also is not None:
                 also(store, settings)
         triage = read_record(run / JSON_FILE)
@@ -141,6 +144,7 @@ def read_line(
         algorithm=settings.algorithm,
         seed=settings.seed,
         evaluations=n,
+        critical=critical,
         budget=settings.budget,
         finished=finished,
         triage=triage,

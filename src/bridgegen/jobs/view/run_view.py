@@ -1,14 +1,14 @@
 """A run as a site: its page, the news since, the motion of any scenario, its files."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from bridgegen.base.disk import read_inside
-from bridgegen.base.errors import InputError
+from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.jobs.search.regions import OWL_FILE
-from bridgegen.jobs.search.report import further_files, run_data
+from bridgegen.jobs.search.report import finding_page, further_files, run_data
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.jobs.search.run import Run
 from bridgegen.pages.data import WHOLE
@@ -32,6 +32,10 @@ class RunView:
         ego: where a driver of your own drives, that same driver.
         simulator: the run's, with where it is on this machine; the run's by default.
 
+    Attributes:
+        home: address of the page that leads here; "" where there is none.
+        also: returns what its page holds besides, by key.
+
     Raises:
         StorageError: not a run, or its scenario or map is not what it was.
         InputError: the scenario or the map is missing, or the ego has to be named.
@@ -46,6 +50,8 @@ class RunView:
     ) -> None:
         self._run = Run(folder)
         self.folder, self.settings = self._run.folder, self._run.settings
+        self.home = ""
+        self.also: Callable[[], Mapping[str, Any]] = dict
         self._rows: Recorded | None = None
         self._pipeline = pipeline_of(self._run, "open", ego=ego, simulator=simulator)
         # The server's threads share the rows in memory, which each request may extend.
@@ -72,7 +78,7 @@ class RunView:
             rows = self._read(store)
             run = Run.of(store, rows)
             data = run_data(self._pipeline, run, rows, run.exported(len(rows)))
-            return report_page(data, live=True)
+            return report_page(data, live=True, also=self.also(), home=self.home)
 
     def news(self, after: int) -> Mapping[str, Any]:
         """Return what is new since the page knew of so many evaluations."""
@@ -96,6 +102,15 @@ class RunView:
                 return None
             known = {exported.evaluation: exported for exported in self._run.exported()}
             return motion_payload(self._pipeline, rows, evaluation, known.get(evaluation))
+
+    def finding(self, name: str) -> bytes | None:
+        """Return the page of one exported scenario, to be sent; None if there is none."""
+        with self._lock, Store.open(self.folder) as store:
+            rows = self._read(store)
+            try:
+                return finding_page(self._pipeline, Run.of(store, rows), rows, name)
+            except UnknownNameError:
+                return None
 
     def file(self, name: str) -> bytes | None:
         """Return an exported file, or a record of a later command; None for any other name."""

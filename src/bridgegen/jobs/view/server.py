@@ -1,10 +1,12 @@
 """A page of this machine for this machine: HTTP on loopback, and nothing that a stranger could use.
 
-Any website that is open in the same browser can send requests to a server on loopback. So only GET
-is answered, only under the names of loopback in the ``Host`` header (a website whose name is made
-to point here sends its own), nothing is written, no path of the file system is ever built from a
-request, and the answers tell the browser not to let other pages read or frame them. Any other user
-of this machine can send requests, too: so every address begins with a secret token.
+Any website that is open in the same browser can send requests to a server on loopback. So requests
+are answered only under the names of loopback in the ``Host`` header (a website whose name is made
+to point here sends its own), and the answers tell the browser not to let other pages read or frame
+them. Any other user of this machine can send requests, too: so every address begins with a secret
+token. A site that is edited takes small JSON by POST, from its own pages only; other sites take
+nothing. A page that lies on the disk, which may be a stranger's, has no origin here: its scripts
+can neither read what is served nor write.
 
 One request is answered at a time. One whose browser has hung up meanwhile is dropped.
 """
@@ -16,8 +18,8 @@ import select
 import socket
 import sys
 import threading
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Protocol, runtime_checkable
@@ -45,6 +47,20 @@ HEADERS = {
     "Cache-Control": "no-store",
 }
 
+# A page from the disk may be a stranger's. Without an origin its scripts are cross-site here; a
+# sandboxed page may have no opener policy either, or browsers refuse it.
+OF_DISK: Mapping[str, str] = {
+    "Content-Security-Policy": "sandbox allow-scripts allow-downloads; "
+    + POLICY.replace("connect-src 'self'", "connect-src 'none'").replace("'self'", "'none'"),
+    "Cross-Origin-Opener-Policy": "unsafe-none",
+}
+
+MAX_BODY = 16_384
+"""Maximum length of what a page may send [bytes]."""
+
+MOST_ASKED = 40
+"""Maximum number of growing runs that are asked about at a time."""
+
 TYPES = {
     "html": "text/html; charset=utf-8",
     "json": "application/json",
@@ -68,6 +84,9 @@ class Site(Protocol):
     def file(self, name: str) -> bytes | None:
         """Return an exported file by its path in the run's folder; None if there is none."""
 
+    def finding(self, name: str) -> bytes | None:
+        """Return the page of one exported scenario, to be sent; None if there is none."""
+
 
 @runtime_checkable
 class Sites(Protocol):
@@ -90,6 +109,21 @@ class Answer:
     status: HTTPStatus
     kind: str
     body: bytes
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+
+@runtime_checkable
+class Project(Sites, Protocol):
+    """Several sites, the files of a project, and what a person decides about its failures."""
+
+    def news(self, after: Sequence[int]) -> Mapping[str, Any]:
+        """Return how many runs there are, and how far some are, by their numbers."""
+
+    def place(self, path: str) -> Answer | None:
+        """Return what is at a path of the project's folder; None if nothing is served there."""
+
+    def decide(self, asked: Mapping[str, Any]) -> tuple[HTTPStatus, Mapping[str, Any]]:
+        """Write what a page asks for; return the status and what the page is told."""
 
 
 def answer(site: Site | Sites, target: str) -> Answer:
@@ -123,6 +157,11 @@ def _of_sites(sites: Sites, path: str, query: Mapping[str, list[str]]) -> Answer
         page = None if first is None or second is None else sites.pair(first, second)
         return _nothing() if page is None else Answer(HTTPStatus.OK, TYPES["html"], page)
     kind, _, rest = path.removeprefix("/").partition("/")
+    if isinstance(sites, Project) and path == "/news":
+        numbers = [_number(text) for text in query.get("run", [""])[0].split(",")[:MOST_ASKED]]
+        return _json(sites.news([number for number in numbers if number is not None]))
+    if isinstance(sites, Project) and kind == "p":
+        return sites.place(rest) or _nothing()
     name, slash, rest = rest.partition("/")
     number = _number(name) if kind == "run" and slash else None
     try:
@@ -143,6 +182,9 @@ def _of_site(site: Site, path: str, query: Mapping[str, list[str]]) -> Answer:
         evaluation = _number(path.removeprefix("/motion/"))
         motion = None if evaluation is None else site.motion(evaluation)
         return _nothing() if motion is None else _json(motion)
+    if path.startswith("/send/"):
+        page = site.finding(path.removeprefix("/send/").removesuffix(".html"))
+        return _nothing() if page is None else Answer(HTTPStatus.OK, TYPES["html"], page, OF_DISK)
     # A site answers from a list of exported files, never by a path: neither `..` nor a link leads
     # out of the run.
     body = site.file(path.removeprefix("/"))
@@ -179,8 +221,12 @@ class _Handler(BaseHTTPRequestHandler):
     def do_HEAD(self) -> None:
         self._send(self._found(), body=False)
 
-    def _found(self) -> Answer | None:
-        """Return the answer; None if the browser has hung up."""
+    def do_POST(self) -> None:
+        self.close_connection = True  # what is refused is not read: no further request follows it
+        self._send(self._written())
+
+    def _refused(self) -> Answer | None:
+        """Return what a stranger is answered; None to those that may ask."""
         # Against DNS rebinding: a name of a stranger's that resolves to this machine.
         if self.headers.get_all("Host", []) not in ([name] for name in self.server.names):
             text = b"This server is for the machine that it runs on.\n"
@@ -190,13 +236,52 @@ class _Handler(BaseHTTPRequestHandler):
         elsewhere = self.headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin")
         if elsewhere and self.headers.get("Sec-Fetch-Dest") != "document":
             return Answer(HTTPStatus.FORBIDDEN, "text/plain", b"Not for other websites.\n")
-        token, slash, rest = self.path.removeprefix("/").partition("/")
+        token, slash, _ = self.path.removeprefix("/").partition("/")
         # The token keeps out other users of the machine; compared in constant time.
         if not (slash and hmac.compare_digest(token.encode(), self.server.token.encode())):
             text = b"The address must be the one that 'bridgegen open' printed, with its token.\n"
             return Answer(HTTPStatus.FORBIDDEN, "text/plain", text)
+        return None
+
+    def _found(self) -> Answer | None:
+        """Return the answer; None if the browser has hung up."""
+        if refused := self._refused():
+            return refused
+        rest = self.path.removeprefix("/").partition("/")[2]
         with self.server.turn:
             return None if self._is_gone() else answer(self.server.site, f"/{rest}")
+
+    def _written(self) -> Answer:
+        """Return the answer to what a page of ours sends; nothing of another's is read."""
+        if refused := self._refused():
+            return refused
+        site, to = self.server.site, self.path.removeprefix("/").partition("/")[2]
+        if not isinstance(site, Project) or to != "status":
+            return Answer(HTTPStatus.NOT_IMPLEMENTED, "text/plain", b"Nothing is written here.\n")
+        # Browsers state the origin of every POST; that of a sandboxed page is "null".
+        if self.headers.get_all("Origin", []) != [f"http://{self.headers['Host']}"]:
+            return Answer(HTTPStatus.FORBIDDEN, "text/plain", b"Not for other websites.\n")
+        if self.headers.get_content_type() != "application/json":
+            # A form of another website cannot send this type without being asked.
+            return _json({"error": ["only JSON is taken"]}, HTTPStatus.UNSUPPORTED_MEDIA_TYPE)
+        length = _number(self.headers.get("Content-Length", ""))
+        if length is None or "Transfer-Encoding" in self.headers:
+            return _json({"error": ["a length must be stated"]}, HTTPStatus.LENGTH_REQUIRED)
+        if length > MAX_BODY:
+            text = f"at most {MAX_BODY:,} bytes are taken, got {length:,}"
+            return _json({"error": [text]}, HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+        try:
+            asked = json.loads(self.rfile.read(length))
+        except (ValueError, RecursionError):
+            asked = None
+        if not isinstance(asked, dict):
+            return _json({"error": ["what was sent is no JSON object"]}, HTTPStatus.BAD_REQUEST)
+        try:
+            with self.server.turn:
+                status, told = site.decide(asked)
+        except BridgeGenError as error:
+            return _json({"error": list(error.problems)}, HTTPStatus.INTERNAL_SERVER_ERROR)
+        return _json(told, status)
 
     def _is_gone(self) -> bool:
         """Whether the browser has hung up while others were answered."""
@@ -211,7 +296,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.close_connection = True
             return
         self.send_response(item.status)
-        for name, value in {**HEADERS, "Content-Type": item.kind}.items():
+        for name, value in {**HEADERS, "Content-Type": item.kind, **item.headers}.items():
             self.send_header(name, value)
         self.send_header("Content-Length", str(len(item.body)))
         self.end_headers()

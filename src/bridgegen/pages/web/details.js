@@ -1,7 +1,7 @@
 // The chosen scenario: its figures, its files, what it is made of.
 
 import { CAUSE_HELP } from "./causes.js";
-import { $, element } from "./common.js";
+import { $, copy, element } from "./common.js";
 import { conflictLines } from "./conflict.js";
 import { criterionOf, marginText } from "./criteria_rows.js";
 import { columns, data } from "./data.js";
@@ -17,6 +17,16 @@ function criteriaLines(metrics) {
     const margin = metrics[name], verdict = margin < 0 ? "violated" : "met";
     return element("div", { title: text ? `${text}\n${formula}` : formula }, element("span", { class: "name" }, id), element("b", { class: margin < 0 ? "hit" : "" }, `${verdict}, ${marginText(margin, unit)}`));
   })];
+}
+
+// One crash as one file: a served page has it made, a page on disk says how.
+function sent(name) {
+  if (data.alone || !/^\d+$/.test(name)) return [];
+  const title = "This crash alone, with its player and its files, as one page";
+  if (data.live) return [element("a", { class: "send", href: `send/${name}.html`, download: `${data.summary.facts[0].replace(/\W+/g, "-")}-${name}.html`, title }, "Send this crash")];
+  const button = element("button", { type: "button", class: "quiet send", title: `Copies the command that writes it. ${title}` }, "Send this crash: copy command");
+  button.addEventListener("click", () => copy(`${data.summary.view.replace(" open ", " export ")} --flavour page --scenario ${name}`, button));
+  return [button];
 }
 
 export function fillDetails(kept) {
@@ -41,7 +51,7 @@ export function fillDetails(kept) {
   const parts = [element("h3", {}, "Its parameters"), ...lines(kept.parameters)];
   if (kept.files.length) {
     const links = kept.files.map(fileLink);
-    parts.push(element("h3", {}, "Its files"), element("div", { class: "files" }, ...links));
+    parts.push(element("h3", {}, "Its files"), element("div", { class: "files" }, ...links), ...sent(kept.name));
   }
   $("details").replaceChildren(...parts);
 }

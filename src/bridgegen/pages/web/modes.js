@@ -87,6 +87,7 @@ class Modes {
         element("ul", { class: "mode-facts" }, fact(number(mode.count), mode.count === 1 ? "scenario" : "scenarios"), ...severity),
         element("p", { class: "mode-buttons" }, play, fold),
       ),
+      ...(data.mode_ids ? [element("p", { class: "mode-status" }, element("span", { "data-mode": data.mode_ids[mode.number] }))] : []), // see status.js
       more,
     );
   }

@@ -17,13 +17,21 @@ import { TableTools } from "./table_tools.js";
 hook.filter = (name, low, high) => filters.set(name, low, high);
 drawSections();
 foldSections();
-if (rows.critical.includes(1) || data.kept.length > drawn.length || anyViolated()) listScenarios();
+if (data.alone) showAlone();
+else if (rows.critical.includes(1) || data.kept.length > drawn.length || anyViolated()) listScenarios();
 else playNearest();
 
 function listScenarios() {
   const opener = new Opener(hook);
   new TableTools(new Table((i, play) => opener.row(i, play)));
   begin(opener);
+}
+
+function showAlone() {
+  $("kept").classList.add("alone");
+  $("list").hidden = true;
+  $("summary-title").textContent = "The search that found it";
+  begin(new Opener(hook));
 }
 
 function playNearest() {

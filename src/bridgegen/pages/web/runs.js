@@ -1,10 +1,12 @@
-// The list of the runs in a folder: sorted and filtered; two are chosen for a look side by side.
+// The list of the runs in a folder: sorted and filtered; two are chosen for a look side by side. Those that grow show it.
 
 import { $, NARROW, element } from "./common.js";
+import "./status.js";
 
 const page = JSON.parse($("data").textContent);
 const runs = page.runs;
 const UNITS = ["B", "kB", "MB", "GB"];
+const EACH = 2000; // ms between two questions while a run grows
 
 const plain = (n) => (n === null ? "–" : n.toLocaleString("en-GB"));
 const perCent = (share) => `${(100 * share).toPrecision(2)}${NARROW}%`;
@@ -39,8 +41,7 @@ const COLUMNS = [
   ["failures", ({ failures }) => failures ?? -1, ({ failures, unjudged, problem }) => [problem ? "" : plain(unjudged ? null : failures)], "number"],
   ["of the space", ({ share }) => share ?? -1, shareCell, "number"],
   ["worst failure", ({ modes, violated }) => modes + Number(violated), modesCell, "words"],
-  ["changed", ({ changed }) => changed, ({ changed }) => [new Date(1000 * changed).toLocaleString("sv-SE").slice(0, 16)], "number"],
-  ["size", ({ size }) => size, ({ size }) => [sizeText(size)], "number"],
+  ["changed", ({ changed }) => changed, ({ changed, size }) => [new Date(1000 * changed).toLocaleString("sv-SE").slice(0, 16), element("small", {}, sizeText(size))], "number"],
 ];
 
 class Runs {
@@ -48,7 +49,6 @@ class Runs {
     this.column = 8;
     this.down = true;
     this.chosen = [];
-    $("folder").textContent = page.folder;
     for (const name of ["scenario", "ego"]) {
       const values = [...new Set(runs.map((run) => run[name]).filter(Boolean))].sort();
       $(name).append(...values.map((value) => element("option", { value }, value)));
@@ -56,6 +56,7 @@ class Runs {
     for (const id of ["text", "scenario", "ego", "failing"]) $(id).addEventListener("input", () => this.fill());
     this.head();
     this.fill();
+    this.grow();
   }
 
   head() {
@@ -94,7 +95,7 @@ class Runs {
   row(run) {
     const box = element("input", { type: "checkbox", "aria-label": `Choose ${run.path}` });
     box.checked = this.chosen.includes(run.number);
-    const row = element("tr", {}, element("td", {}, box), ...COLUMNS.map(([, , cell, kind]) => element("td", { class: kind }, ...cell(run))));
+    const row = element("tr", {}, element("td", {}, box), ...COLUMNS.map(([title, , cell, kind]) => element("td", { class: kind, "data-title": title }, ...cell(run))));
     row.classList.toggle("chosen", box.checked);
     box.addEventListener("change", () => {
       this.chosen = box.checked ? [...this.chosen, run.number].slice(-2) : this.chosen.filter((one) => one !== run.number);
@@ -110,7 +111,32 @@ class Runs {
     link.setAttribute("aria-disabled", `${!ready}`);
     if (ready) link.setAttribute("href", `pair?first=${a}&second=${b}`);
     else link.removeAttribute("href");
-    link.textContent = ready ? "Show the two side by side" : "Choose two runs to see them side by side";
+    link.textContent = ready ? "Show the two side by side" : b === undefined && a !== undefined ? "Choose one more run" : "Choose two runs to compare";
+  }
+
+  // The searches that run now, each with its counts.
+  grow() {
+    const growing = runs.filter((run) => run.grows);
+    $("growing").hidden = !growing.length;
+    $("growing").replaceChildren(...growing.map((run) => {
+      const counts = element("p", {}, element("b", {}, plain(run.evaluations)), ` of ${plain(run.budget)} evaluations, `, element("b", {}, plain(run.critical)), " critical");
+      const bar = element("progress", { max: `${run.budget}`, value: `${run.evaluations}`, "aria-label": `Evaluations of ${run.path}` });
+      return element("div", { class: "card" }, element("h3", {}, element("i", { "aria-hidden": "true" }), element("a", { href: `run/${run.number}/` }, run.path)), element("p", { class: "muted" }, `${run.scenario}, ${run.ego}, ${run.algorithm}`), counts, bar);
+    }));
+    setTimeout(() => this.ask(growing), EACH);
+  }
+
+  async ask(growing) {
+    let news = null;
+    try {
+      if (!document.hidden) news = await (await fetch(`news?run=${growing.map(({ number }) => number).join()}`)).json();
+    } catch { /* no longer served: what was known last stays */ }
+    const ended = news?.runs?.some((run) => run.finished), more = news && news.total !== runs.length;
+    // Verdict and list follow from it; but nobody loses what is being written or chosen.
+    if ((ended || more) && !this.chosen.length && !document.activeElement?.matches("input, select")) return location.reload();
+    for (const run of news?.runs ?? []) Object.assign(runs[run.number], run);
+    if (news?.runs?.length) this.fill();
+    this.grow();
   }
 }
 

@@ -22,7 +22,7 @@ export function addSection(section) {
 export function drawSections() {
   for (const { id, key, title, draw } of sections) {
     const found = data[key], host = $(id) ?? newSection(id, title);
-    host.hidden = found === null || found.length === 0;
+    host.hidden = found === null || found.length === 0 || data.alone; // one scenario fills no chart
     if (!host.hidden) draw(found, host);
   }
 }

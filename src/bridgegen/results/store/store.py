@@ -349,6 +349,11 @@ class Store:
         return self._number("SELECT coalesce(max(id) + 1, 0) FROM evaluations")
 
     @property
+    def n_critical(self) -> int:
+        """The number of critical evaluations."""
+        return self._number("SELECT COUNT(*) FROM evaluations WHERE critical AND status = 0")
+
+    @property
     def n_batches(self) -> int:
         """The number of recorded batches."""
         last = "(SELECT max(id) FROM evaluations)"
