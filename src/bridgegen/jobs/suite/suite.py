@@ -16,6 +16,7 @@ from bridgegen import drivers as egos
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, Interrupted, StorageError
 from bridgegen.base.records import parse_json
+from bridgegen.drivers.identity import identity_of, labels_of
 from bridgegen.engine.options import called_with, range_problems
 from bridgegen.engine.workers.processes import cores
 from bridgegen.engine.workers.tasks import TaskPool
@@ -71,6 +72,19 @@ class SuiteRun:
             FileFormatError: an index is damaged.
         """
         return KnownFailures.of(self.results)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """How each ego is called; of the scenarios' own drivers, the one that all have."""
+        found = []
+        for ego in self.egos:
+            results = self.of_ego(ego)
+            own = {result.driver for result in results if result.driver}
+            shared = own.pop() if len(own) == 1 else "the scenarios' own drivers"
+            digest = next((one.driver_digest for one in results if one.driver_digest), "")
+            name = str(self.settings.get("driver_name") or "")
+            found.append(identity_of(ego or shared, digest, name))
+        return tuple(labels_of(found))
 
     @property
     def work(self) -> str:

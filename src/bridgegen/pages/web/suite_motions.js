@@ -2,6 +2,7 @@
 
 import { $ } from "./common.js";
 import { data } from "./data.js";
+import { glyph } from "./glyph.js";
 import { hook } from "./hook.js";
 import { inflated } from "./inflate.js";
 import { Player } from "./player.js";
@@ -14,6 +15,7 @@ const unpacked = async (text) => JSON.parse(new TextDecoder().decode(await infla
 class Motions {
   constructor() {
     this.wanted = -1;
+    this.owner = null;
     /** @type {Player | null} */
     this.player = null;
   }
@@ -32,8 +34,24 @@ class Motions {
     const on = packed.on[k], [kept, road] = await Promise.all([unpacked(packed.texts[k]), data.roads[on] ?? unpacked(packed.roads[on])]);
     data.roads[on] = road;
     kept.road = on;
+    if (kept.twin) {
+      Object.assign(kept, { driver: suite.egos[1] });
+      Object.assign(kept.twin, { driver: suite.egos[0], road: on });
+    }
     data.kept.push(kept); // the player's address is by name
     return kept;
+  }
+
+  // A picture of the conflict of one, in an element, once it is read; of two drivers, of the one that has it.
+  async picture(k, host) {
+    const kept = await this.get(k), made = glyph(kept) ?? (kept.twin && glyph(kept.twin));
+    if (made) host.replaceChildren(made);
+  }
+
+  // Who has the player closes where it was: there is one.
+  take(owner) {
+    if (this.owner && this.owner !== owner) this.owner.close();
+    this.owner = owner;
   }
 
   // Plays one inside an element.
