@@ -14,12 +14,15 @@ from bridgegen.base.errors import InputError
 from bridgegen.drivers.address import Command, address_of, is_remote
 from bridgegen.drivers.drivers import file_of
 
+MOST_LETTERS = 80
+"""Maximum number of characters of the name that a user gives a driver."""
+
 MOST_FILES, MOST_BYTES = 64, 2**20
 """Largest number of modules of a driver that are read, and of the bytes [bytes] of each that are
 searched for imports."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, order=True)
 class Identity:
     """A driver as results tell it from others.
 
@@ -64,6 +67,20 @@ def labels_of(drivers: Sequence[Identity]) -> list[str]:
         more = f" {number}" if number > 1 else ""
         found.append(f"{driver.name} (changed{more})" if number else driver.name)
     return found
+
+
+def checked_name(name: str) -> str:
+    """Return what a user calls a driver.
+
+    Raises:
+        InputError: it is no line of 1 to `MOST_LETTERS` characters.
+    """
+    if not (name.isprintable() and name.strip() and len(name) <= MOST_LETTERS):
+        raise InputError(
+            f"a driver's name (--name) must be a line of 1 to {MOST_LETTERS} characters, got "
+            f"{ascii(name)[:MOST_LETTERS]}"
+        )
+    return name
 
 
 def digest_of(driver: str) -> str:

@@ -16,7 +16,7 @@ from bridgegen import drivers as egos
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, Interrupted, StorageError
 from bridgegen.base.records import parse_json
-from bridgegen.drivers.identity import identity_of, labels_of
+from bridgegen.drivers.identity import checked_name, identity_of, labels_of
 from bridgegen.engine.options import called_with, range_problems
 from bridgegen.engine.workers.processes import cores
 from bridgegen.engine.workers.tasks import TaskPool
@@ -165,10 +165,11 @@ def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
     files = [given.files] if isinstance(given.files, str | Path) else list(given.files)
     simulator = given.simulator if isinstance(given, SuiteOptions) else EMBEDDED
     _check(given, simulator)
+    name = given.of_each.driver_name
     entries = of_edition(find_entries(files), given.matrix)
     drivers = tuple(dict.fromkeys(given.egos)) or ("",)
     folder = Path(given.out) if given.out is not None else _folder(files)
-    settings = _settings(given, simulator)
+    settings = _settings(given, simulator) | ({"driver_name": name} if name else {})
     jobs = [
         Job(
             entry,
@@ -228,6 +229,10 @@ def _check(given: ScenariosOptions, simulator: SimulatorChoice) -> None:
                 f"the vehicle '{given.vehicle}' is of the embedded simulator; {simulator.name} "
                 f"moves the ego in its own way (--vehicle {vehicles.KINEMATIC})"
             )
+    if given.of_each.driver_name is not None:
+        checked_name(given.of_each.driver_name)
+        if len(given.egos) != 1:
+            problems.append(f"--name names one driver (--ego), got {len(given.egos)}")
     if problems:
         raise InputError(*problems)
 

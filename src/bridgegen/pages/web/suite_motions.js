@@ -1,6 +1,7 @@
 // The playbacks of a suite's worst failures: each is inflated when it is wanted, and so is its road.
 
 import { $ } from "./common.js";
+import { ZONED } from "./conflict.js";
 import { data } from "./data.js";
 import { glyph } from "./glyph.js";
 import { hook } from "./hook.js";
@@ -42,9 +43,9 @@ class Motions {
     return kept;
   }
 
-  // A picture of the conflict of one, in an element, once it is read; of two drivers, of the one that has it.
+  // A picture of the contact or near miss of one, in an element, once it is read; of two drivers, the second's before the first's.
   async picture(k, host) {
-    const kept = await this.get(k), made = glyph(kept) ?? (kept.twin && glyph(kept.twin));
+    const kept = await this.get(k), shown = [kept, kept.twin].find((one) => ZONED.includes(one?.conflict?.conflict)), made = shown && glyph(shown);
     if (made) host.replaceChildren(made);
   }
 
