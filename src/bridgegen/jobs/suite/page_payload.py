@@ -203,8 +203,9 @@ def _changed(
 
 
 def _happens(row: RowResult) -> str:
-    """Return the conflict of a variation that counts, and with whom, parted by a line feed."""
-    return f"{row.conflict}\n{row.partner}" if row.conflict in _HAPPENED else ""
+    """Return the conflict of a variation that counts, its type, and with whom, a line each."""
+    some = (row.conflict, row.conflict_type, row.partner)
+    return "\n".join(some) if row.conflict in _HAPPENED else ""
 
 
 def _verdicts(suite: SuiteRun, of_it: Mapping[str, EntryResult]) -> list[Verdict]:

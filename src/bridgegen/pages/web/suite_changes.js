@@ -2,11 +2,10 @@
 
 import { readAddress } from "./address.js";
 import { $, element } from "./common.js";
-import { conflictWord } from "./findings.js";
 import { inflated } from "./inflate.js";
 import { shareText } from "./numbers.js";
 import { motions } from "./suite_motions.js";
-import { CLASSES, PASSES, button, counted, suite } from "./suite_words.js";
+import { CLASSES, PASSES, button, counted, happens, suite } from "./suite_words.js";
 
 const KIND_NAMES = ["broken", "fixed", "worse", "milder", "same"]; // in the order of difference.py
 const CHANGING = 4; // of these
@@ -73,8 +72,8 @@ class Changes {
   }
 
   verdict(i, e) {
-    const { v, severity, what } = this.rows.of[e], [conflict, partner] = this.rows.words[what[i]].split("\n");
-    const happened = conflict ? [conflictWord(conflict), partner ? `with ${partner}` : ""].filter(Boolean).join(" ") : "";
+    const { v, severity, what } = this.rows.of[e], words = this.rows.words[what[i]];
+    const happened = words ? happens({ conflict: words.split("\n") }) : "";
     const harm = severity[i] ? `MAIS3+ ${shareText(severity[i])}` : "";
     return [element("span", { class: v[i] === "p" ? "" : CLASSES[v[i]] }, PASSES[v[i]]), element("small", {}, [happened, harm].filter(Boolean).join(", "))];
   }
