@@ -66,7 +66,7 @@ class Changes {
   row(i) {
     const kind = KIND_NAMES[this.rows.kind[i]] ?? "not comparable", motion = this.rows.motion[i], picture = element("td", { class: "picture" });
     if (motion >= 0) motions.picture(motion, picture);
-    const name = motion < 0 ? element("span", {}, this.name(i)) : button(this.name(i), () => (this.open === i ? this.close() : this.show(i)), { class: "open", "aria-expanded": "false" });
+    const name = motion < 0 ? element("span", {}, this.name(i)) : button(this.name(i), () => this.toggle(i), { class: "open", "aria-expanded": "false" });
     return element("tr", { "data-row": `${i}` }, picture, element("td", { class: "name" }, name), element("td", { "data-title": "change" }, element("span", { class: `kind ${kind}` }, kind)),
       ...suite.egos.map((ego, e) => element("td", { "data-title": ego }, ...this.verdict(i, e))));
   }
@@ -85,6 +85,12 @@ class Changes {
     host.previousElementSibling.querySelector(".open").setAttribute("aria-expanded", "false");
     host.remove();
     this.open = -1;
+  }
+
+  toggle(i) {
+    if (this.open === i) return this.close();
+    history.replaceState(null, "", `#${encodeURIComponent(this.name(i))}`);
+    return this.show(i);
   }
 
   async show(i, seconds = null) {
