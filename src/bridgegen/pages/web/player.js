@@ -80,10 +80,21 @@ export class Player {
     $("to-closest").hidden = kept.closest === null || kept.contacts.includes(kept.closest);
     $("to-diverged").hidden = (kept.diverged ?? null) === null;
     this.scene.show(kept);
-    this.twinScene?.show(this.twin);
+    if (this.twinScene) this.showTwin();
     this.curves.show(kept, this.twin);
     this.showLegend();
     fillConflict(kept, this.twin);
+  }
+
+  // Both scenes keep the same partner in sight.
+  showTwin() {
+    const { kept, twin } = this, partner = [kept, twin].map((one) => one.conflict?.partner_number ?? 0).find((e) => e > 0);
+    this.twinScene.show(twin);
+    if (!partner) return;
+    for (const { camera } of this.scenes) {
+      camera.partner = partner;
+      camera.frame("conflict");
+    }
   }
 
   // The same scenario with another driver, in step: its scene stands before that of this one.
@@ -99,6 +110,8 @@ export class Player {
     this.otherScene ??= new Scene($("twin-scene"), () => this.redraw());
     this.twinScene = this.otherScene;
     this.twinScene.layers = this.scene.layers;
+    // The same bodies have the same colours in both.
+    this.kept.players = this.twin.players = [...new Set([...playersOf(this.kept), ...playersOf(this.twin)])];
     this.scenes = [this.twinScene, this.scene];
     $("twin-name").textContent = this.twin.driver;
     $("scene-name").textContent = this.kept.driver;
