@@ -23,6 +23,8 @@ from bridgegen.jobs.suite.page_payload import payload
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.sentences import difference, differences, headline
 from bridgegen.jobs.suite.suite import SuiteRun, evaluate_suite
+from bridgegen.pages.playback import Entity, Playback
+from bridgegen.pages.playbacks import diverged_at
 from bridgegen.results.failures import read_failures, write_failures
 
 CRITERIA = {"criteria": ["C-1: always(ego.v < 12 m/s)"]}
@@ -235,6 +237,35 @@ def test_a_thousand_entries_with_many_variations_fit():
         assert found["total"] == 100
         assert 1 <= len(found["at"]) <= 100
         assert found["at"][0] == one.worst
+
+
+# ---- where two drivers diverge ----
+
+
+def played(x: list[float], a: list[float]) -> Playback:
+    """Return the motion of an ego alone, by its position [m] and acceleration [m/s²]."""
+    row = np.array([x])
+    return Playback(
+        name="one", rank=1, evaluation=0, parameters={}, metrics={}, critical=False,
+        time_step=0.1, entities=(Entity("ego", 4.0, 2.0, 1.4),), x=row, y=0.0 * row, h=0.0 * row,
+        v=0.0 * row, a=np.array([a]), distance=np.full(len(x), np.inf), lanes=(), n_steps=len(x),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("x", "a", "instant"),
+    [
+        ([0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0], None),
+        ([0.0, 1.0, 2.09, 3.0], [0.0, 0.9, 0.0, 0.0], None),  # less than what one sees
+        ([0.0, 1.0, 2.0, 3.2], [0.0, 0.0, 0.0, 0.0], 3),  # 0.2 m apart
+        ([0.0, 1.0, 2.0, 2.9], [0.0, -4.0, -4.0, 0.0], 1),  # the command shows first
+        ([0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, -9.0], None),  # no step follows the last instant
+        ([0.0, 1.0, 2.0], [0.0, 0.0, 0.0], 2),  # it ends earlier
+    ],
+)
+def test_drivers_diverge_by_position_or_by_command(x, a, instant):
+    plain = played([0.0, 1.0, 2.0, 3.0], [0.0] * 4)
+    assert diverged_at(plain, played(x, a)) == diverged_at(played(x, a), plain) == instant
 
 
 # ---- pages of suites that ran ----

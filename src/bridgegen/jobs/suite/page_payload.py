@@ -172,9 +172,10 @@ def _changed(
     of = []
     for by_name in results:
         rows = [by_name[row.entry].rows[row.row] for row in shown]
+        verdicts = {name: one.verdicts for name, one in by_name.items()}
         of.append(
             {
-                "v": "".join(_LETTER[by_name[row.entry].verdicts[row.row]] for row in shown),
+                "v": "".join(_LETTER[verdicts[row.entry][row.row]] for row in shown),
                 "severity": [_short(row.severity) for row in rows],
                 "what": words.at(_happens(row) for row in rows),
             }

@@ -84,7 +84,9 @@ class SuiteRun:
             digest = next((one.driver_digest for one in results if one.driver_digest), "")
             name = str(self.settings.get("driver_name") or "")
             found.append(identity_of(ego or shared, digest, name))
-        return tuple(labels_of(found))
+        labels = tuple(labels_of(found))
+        # Files of one content in two folders, whose weights beside them may differ.
+        return labels if len(set(labels)) == len(labels) else self.egos
 
     @property
     def work(self) -> str:
