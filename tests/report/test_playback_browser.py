@@ -360,3 +360,56 @@ def test_a_driver_that_does_not_tell_its_plan_is_said_to_have_none(show):
     assert now["intention"]["a"] == pytest.approx(case.rollout.a[0, 0, k], abs=0.006)
     assert "plans" not in now["told"]
     assert page.complaints == []
+
+
+def test_in_perspective_bodies_are_where_a_pinhole_camera_sees_them(show, lights):
+    """From behind the ego, turned by a drag, and from straight above."""
+    page = show(lights)
+    page.evaluate("bridgegen.select(0)")
+    k = lights.steps(0)[1]
+    page.click("#chase")
+    page.evaluate(f"bridgegen.seek({k})")
+    width, height = page.evaluate("(({ clientWidth: w, clientHeight: h }) => [w, h])(scene)")
+
+    def seen(yaw: float, pitch: float, away: float = 17.0) -> list[tuple[float, float] | None]:
+        shown, bodies = state(page), page.evaluate("bridgegen.data.kept[0].entities")
+        centres = [
+            np.array([b["x"], b["y"], 0.0])
+            + body["center_ahead"] * np.array([math.cos(b["h"]), math.sin(b["h"]), 0.0])
+            for b, body in zip(shown["entities"], bodies, strict=True)
+        ]
+        turned = shown["entities"][0]["h"] + yaw
+        flat = np.array([math.cos(turned), math.sin(turned), 0.0])
+        ahead = math.cos(pitch) * flat - math.sin(pitch) * np.array([0.0, 0.0, 1.0])
+        right = np.cross(flat, [0.0, 0.0, 1.0])
+        eye = centres[0] + [0.0, 0.0, 1.2] - away * ahead
+        found = []
+        for centre in centres:
+            x, y, z = (centre - eye) @ np.stack([right, np.cross(right, ahead), ahead], axis=1)
+            focus = 0.8 * width
+            pixel = (width / 2 + focus * x / z, 0.56 * height - focus * y / z)
+            found.append(pixel if z > 0 else None)
+        return found
+
+    def agrees(yaw: float, pitch: float) -> None:
+        shown = state(page)["screen"]
+        for pixel, wanted in zip(shown, seen(yaw, pitch), strict=True):
+            assert (pixel is None) == (wanted is None)
+            assert pixel is None or pixel == pytest.approx(wanted, abs=0.01)
+
+    agrees(0.0, 0.26)
+    behind = page.evaluate(PIXELS)
+    box = page.locator("#scene").bounding_box()
+    page.mouse.move(box["x"] + 200, box["y"] + 200)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 300, box["y"] + 240)
+    page.mouse.up()
+    agrees(-0.6, 0.5)
+    assert page.evaluate(PIXELS) != behind
+    page.click("#chase")  # from above
+    agrees(-0.6, math.pi / 2)
+    page.evaluate("bridgegen.select(1)")
+    assert page.get_attribute("#chase", "aria-pressed") == "true"  # of another scenario, too
+    page.click("#follow")
+    assert page.get_attribute("#chase", "aria-pressed") == "false"
+    assert page.complaints == []

@@ -314,3 +314,48 @@ def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(brows
     assert not page.workers
     assert page.evaluate(drawn) == with_workers
     page.close()
+
+
+@pytest.mark.browser
+def test_a_strip_below_each_slider_says_what_moving_it_would(browser, tmp_path):
+    run = bg.run_search("crossroads-s4", budget=300, keep=2, triage="none", out=tmp_path / "run")
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.goto((run.folder / "report.html").as_uri())
+    name = '#explore input[aria-label="bv_speed"]'
+    page.hover(name)
+    page.wait_for_selector(f"label:has({name[9:]}) .strip[style*=gradient]")
+    strip = page.get_attribute(f"label:has({name[9:]}) .strip", "style")
+    colours = re.findall(r"var\(--([\w-]+)\) [\d.]+% [\d.]+%", strip)
+    assert len(colours) == 60
+    assert {"hit", "soft"} <= set(colours)
+    for k in (0, colours.index("hit"), 59):
+        page.evaluate(
+            """([at, k]) => { const slider = document.querySelector(at);
+                 slider.step = "any";
+                 slider.value = Number(slider.min) + (k / 59) * (slider.max - slider.min);
+                 slider.dispatchEvent(new Event("input")); }""",
+            [name, k],
+        )
+        fails = {"hit": ".tried:has-text('FAILS: collision')", "soft": ".tried:has-text('no conf')"}
+        page.wait_for_selector(fails[colours[k]])
+    page.close()
+
+
+@pytest.mark.browser
+def test_what_matters_stands_with_its_slices_and_a_column_narrows_the_page(browser, tmp_path):
+    run = bg.run_search("crossroads-s4", budget=300, keep=2, out=tmp_path / "run")
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.goto((run.folder / "report.html").as_uri())
+    (first, *_) = run.triage.influences
+    row = page.locator("#importance-body tr").first
+    assert row.locator("th").inner_text().startswith(first.name)
+    assert row.locator("b").inner_text() == f"{first.distance:.2f}"
+    columns = row.locator(".slice button")
+    texts = [column.get_attribute("aria-label") for column in columns.all()]
+    counts = [re.search(r": (\d+) of (\d+) evaluations", text).groups() for text in texts]
+    assert sum(int(n) for _, n in counts) == 300
+    assert sum(int(n) for n, _ in counts) == run.summary.critical
+    critical = [int(n) for n, _ in counts]
+    columns.nth(critical.index(max(critical))).click()
+    page.wait_for_selector(f"#list-note:has-text('{max(critical)} of')")
+    page.close()

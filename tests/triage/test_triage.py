@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from tests.approval import approve
 
+from bridgegen.scenario.language.reader import load
 from bridgegen.search.triage.effort import FULL, NONE, SHORT
-from bridgegen.search.triage.influence import ends_in_words, in_words
+from bridgegen.search.triage.influence import ends_in_words, in_words, influences
 from bridgegen.search.triage.triage import harmful_rows, triage
 from bridgegen.search.triage.words import headline, mode_in_words
 
@@ -194,6 +195,18 @@ def test_rules_of_a_mode_are_counted(space, world, fixed):
     )
     assert mode.rule == "rear distance"
     assert "; or " in mode.title
+
+
+def test_a_range_that_begins_at_0_is_not_said_to_end_there():
+    """A share of 0 % and a time of 0 s cannot be exceeded: to widen the range is no advice."""
+    space = load("crossroads-s4").space()
+    X = space.decode(np.random.default_rng(0).random((400, space.n_var)))
+    column = space.names.index("precipitation")
+    X[:, column] = np.repeat([0.0, 50.0], 200)
+    fails = X[:, column] == 0.0
+    found = influences(space, X, fails, np.ones(400, dtype=bool))
+    (rain,) = [influence for influence in found if influence.name == "precipitation"]
+    assert (rain.distance, rain.at_low, rain.failures) == (1.0, 0, 200)
 
 
 def test_it_says_which_parameters_matter_and_where_failures_end_with_the_range(space, world):

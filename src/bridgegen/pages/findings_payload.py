@@ -6,9 +6,9 @@ from typing import Any
 from bridgegen.assess.conflict.findings import Findings
 from bridgegen.base.arrays import Bool
 from bridgegen.pages.playback import Conflict
+from bridgegen.search.triage.influence import ends_in_words
 from bridgegen.search.triage.judgement import judgement
 from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
-from bridgegen.search.triage.words import parameters_in_words
 
 FINDING_FIELDS = ("conflict", "conflict_type", "responsible", "rule", "partner")
 """The fields of a row's finding, in the page's order."""
@@ -84,7 +84,16 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "neighbours": found.neighbours,
         "radius": found.radius,
         "untested": found.untested,
-        "matters": parameters_in_words(found),
+        "influences": [
+            {
+                "name": influence.name,
+                "distance": round(influence.distance, 3),
+                "end": "".join(
+                    f"{end}: widen the range?" for end in ends_in_words([influence])[:1]
+                ),
+            }
+            for influence in found.influences
+        ],
         "judged": {
             neighbourhood.evaluation: neighbourhood.judgement
             for neighbourhood in found.neighbourhoods

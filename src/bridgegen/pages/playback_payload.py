@@ -15,7 +15,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.pages.findings_payload import conflict_payload
 from bridgegen.pages.playback import Beside, Course, Lamp, Planned, Playback, Sensed, Weather
 from bridgegen.pages.series import packed
-from bridgegen.scenario.participants import drawing_of
+from bridgegen.scenario.participants import PARTICIPANTS, drawing_of
 from bridgegen.scenario.weather import in_words
 
 SCALE = {
@@ -89,6 +89,7 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
                 "length": float(e.length),
                 "width": float(e.width),
                 "center_ahead": float(e.center_ahead),
+                "height": PARTICIPANTS.get(e.type, PARTICIPANTS["car"]).body.height,
                 "shape": drawing_of(e.type).shape,
                 "headlights": drawing_of(e.type).headlights,
                 "shows": [] if p.shows is None else _shows(p.shows[i, : p.n_steps]),

@@ -283,6 +283,7 @@ SECTIONS = (
     Section("happening.js", "happening", _happening, grows=True),
     Section("trends.js", "batches", _batches, grows=True),
     Section("regions.js", "regions", _regions, grows=True),
+    Section("importance.js"),
     Section("scatter.js"),
     Section("parallel.js"),
     Section("coverage.js", "coverage", _coverage),

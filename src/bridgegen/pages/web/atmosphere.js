@@ -13,7 +13,7 @@ const BEAM_SPREAD = 0.34; // rad to either side
 const CLEAR = 1000; // m, who sees farther sees the whole picture
 
 // 0 by day to 1 in a moonless night, by the luminance of the ground [cd/m²].
-function darkness({ background }) {
+export function darkness({ background }) {
   return Math.min(1, Math.max(0, (2 - Math.log10(Math.max(background, 1e-3))) / 4));
 }
 

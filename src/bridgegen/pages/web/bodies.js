@@ -4,7 +4,7 @@ import { palette } from "./colours.js";
 import { boxCentre } from "./geometry.js";
 import { lightAt } from "./unpack.js";
 
-const LAMPS = [ // states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green
+export const LAMPS = [ // states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green
   { at: 2.2, lit: [1, 2], colour: "#ff4d4d" }, { at: 0, lit: [2, 3], colour: "#ffd23f" }, { at: -2.2, lit: [4], colour: "#38d39f" },
 ];
 

@@ -22,13 +22,15 @@ export class Camera {
   constructor(view, kept, centres) {
     Object.assign(this, { view, kept, centres });
     this.partner = partnerOf(kept);
+    if (view.framing === "chase") return; // the reader's choice stays, whatever is shown
     this.frame(this.partner ? "conflict" : "all");
     if (view.framing === "all" && view.scale < TOO_SMALL) this.frame("ego");
   }
 
-  /** @param {"conflict" | "all" | "ego"} framing */
+  /** @param {"conflict" | "all" | "ego" | "chase"} framing */
   frame(framing) {
     const { view } = this;
+    if (framing === "chase" && view.framing === "chase") view.orbit.pitch = view.orbit.pitch > 1 ? 0.26 : Math.PI / 2; // once more: from above, and back
     view.framing = framing;
     view.factor = 1;
     if (framing === "all") view.fit(playersOf(this.kept).flatMap((e) => this.centres[e]).filter(Boolean), AROUND_BODIES);

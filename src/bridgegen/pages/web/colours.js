@@ -8,7 +8,7 @@ function readPalette() {
   const style = getComputedStyle(document.documentElement);
   const names = ["bg", "card", "ink", "muted", "line", "soft", "accent", "critical", "plain", "band", "grid", "ground",
     "asphalt", "asphalt-2", "marking", "stop", "ego", "other-1", "other-2", "other-3", "label", "hit", "cone",
-    "seen", "displaced", "missed", "fog", "rain"];
+    "seen", "displaced", "missed", "fog", "rain", "sky"];
   palette = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 

@@ -1,7 +1,7 @@
 // Other values of the chosen scenario's parameters, simulated in the page while they change.
 
 import { $, copy, element } from "./common.js";
-import { breathe, ExploreMap } from "./explore_map.js";
+import { SHADES, breathe, ExploreMap, legendOfShades } from "./explore_map.js";
 import { workers } from "./explore_workers.js";
 import { columns, data } from "./data.js";
 import { inflated } from "./inflate.js";
@@ -14,6 +14,8 @@ import { unpack } from "./unpack.js";
 const given = data.simulation;
 
 const ROUNDED = 0.001; // m: the page holds whole millimetres
+const SLICE = 60; // verdicts along a slider
+const REST = 150; // ms without a change before slices are drawn
 
 /** @type {Promise<Simulator> | null} */
 let started = null;
@@ -154,6 +156,7 @@ export class Explorer {
     if (given.refused) return this.refuse(given.refused);
     this.values = { ...kept.parameters };
     this.row = null;
+    this.slicing = 0;
     this.driver = given.driver;
     this.sliders = new Map();
     const lines = given.space.filter(({ searched, name }) => searched && !given.unused.includes(name)).map((part) => this.slider(part));
@@ -166,13 +169,14 @@ export class Explorer {
       made.addEventListener("click", act);
       return made;
     };
-    const drivers = Object.keys(given.drivers);
+    const drivers = Object.keys(given.drivers), sliders = element("div", { class: "sliders" }, ...lines);
+    for (const type of ["pointerenter", "focusin"]) sliders.addEventListener(type, () => { if (!this.slicing) void this.slices(); });
     this.box.replaceChildren(
       element("div", { class: "said" }, this.said, element("div", { class: "presets" },
         ...(drivers.length > 1 ? [this.drivers(drivers)] : []), button("As found", () => this.set(this.base.parameters), "The values of the chosen scenario"),
         button("Defaults", () => this.set(Object.fromEntries(given.space.map((part) => [part.name, part.default]))), "The scenario's own defaults"),
         button("Copy command", (event) => this.copy(event.currentTarget), "The command line that simulates what is shown, to the last bit"), ...this.savers(button))),
-      this.figures, element("div", { class: "sliders" }, ...lines), element("p", { class: "muted small" }, limits()));
+      this.figures, sliders, element("p", { class: "legend" }, ...legendOfShades()), element("p", { class: "muted small" }, limits()));
     if (given.file.refused) this.box.append(element("p", { class: "muted small" }, `What is shown is not saved as a file here: ${given.file.refused}.`));
     if (this.sliders.size > 1) this.addMap();
   }
@@ -189,18 +193,36 @@ export class Explorer {
     return made;
   }
 
+  // What gives verdicts on rows around the present one: a worker for each core, else the page itself.
+  async judges() {
+    const kernels = await simulator(), own = async (asked) => { await breathe(); return kernels.verdicts(asked); };
+    helpers ??= workers(kernels);
+    const found = await helpers;
+    return (found.length ? found : [own]).map((judge) => (others) => judge({ driver: this.driver, any: harmsAny, values: this.values, others }));
+  }
+
+  // Below each slider, the verdicts along it while the others stay; a later call ends an earlier one.
+  async slices() {
+    const run = ++this.slicing, left = [...this.sliders];
+    if (!agrees(await simulator())) return;
+    const judges = await this.judges();
+    await Promise.all(judges.map(async (judge) => {
+      while (left.length && run === this.slicing) {
+        const [name, { range, strip }] = left.shift(), low = Number(range.min), high = Number(range.max), cells = Math.min(SLICE, range.step === "1" ? high - low + 1 : SLICE);
+        const verdicts = await judge(Array.from({ length: cells }, (_, k) => ({ [name]: low + ((high - low) * k) / Math.max(1, cells - 1) })));
+        if (run !== this.slicing) return;
+        const stops = verdicts.map((verdict, k) => `var(--${verdict < 0 ? "card" : SHADES[verdict][1]}) ${(100 * k) / cells}% ${(100 * (k + 1)) / cells}%`);
+        strip.style.background = `linear-gradient(to right, ${stops.join(", ")})`;
+      }
+    }));
+  }
+
   addMap() {
     const parts = given.space.filter(({ name }) => this.sliders.has(name));
     // First those that the failures differ in most from other rows.
     const telling = data.rows.telling.filter((name) => this.sliders.has(name));
     parts.sort((a, b) => (telling.indexOf(a.name) + 1 || 99) - (telling.indexOf(b.name) + 1 || 99));
-    const ready = async () => {
-      const kernels = await simulator(), own = async (asked) => { await breathe(); return kernels.verdicts(asked); };
-      helpers ??= workers(kernels);
-      const judges = await helpers;
-      return (judges.length ? judges : [own]).map((judge) => (others) => judge({ driver: this.driver, any: harmsAny, values: this.values, others }));
-    };
-    this.map = new ExploreMap(parts, ready, (values) => this.set({ ...this.values, ...values }));
+    this.map = new ExploreMap(parts, () => this.judges(), (values) => this.set({ ...this.values, ...values }));
     this.box.append(this.map.box);
   }
 
@@ -208,8 +230,9 @@ export class Explorer {
     const column = columns.get(part.name), text = element("output", {});
     const range = element("input", { type: "range", min: part.low, max: part.high, step: part.whole ? 1 : (part.high - part.low) / 1000, "aria-label": part.name });
     range.addEventListener("input", () => this.set({ ...this.values, [part.name]: Number(range.value) }, part.name));
-    this.sliders.set(part.name, { range, text, column });
-    const label = element("label", { title: column?.description ?? "" }, element("span", { class: "name" }, part.name), text, range);
+    const strip = element("i", { class: "strip", "aria-hidden": "true" });
+    this.sliders.set(part.name, { range, text, strip, column });
+    const label = element("label", { title: column?.description ?? "" }, element("span", { class: "name" }, part.name), text, range, strip);
     this.write(part.name, this.values[part.name]);
     return label;
   }
@@ -237,6 +260,7 @@ export class Explorer {
       if (status < 0) this.said.textContent = "Not simulated here: it needs a way that this page does not hold.";
       else if (status > 0) this.said.textContent = "These values make no scenario.";
       else this.tell(made, kernels);
+      if (status >= 0) setTimeout(() => { if (row === this.row) void this.slices(); }, REST);
       if (!(moved && [this.map?.x.value, this.map?.y.value].includes(moved))) this.map?.draw();
     } finally {
       this.busy = false;

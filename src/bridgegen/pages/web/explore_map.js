@@ -9,10 +9,19 @@ const COARSE = [8, 4, 2, 1]; // strides of the passes: the whole is seen at once
 const CELLS_AT_ONCE = 24; // cells, some milliseconds
 
 /** Verdicts by what they are called, with the name of their colour. */
-const SHADES = [
+export const SHADES = [
   ["no conflict", "soft"], ["conflict that does not count", "plain"],
   ["near miss or violation", "critical"], ["collision", "hit"],
 ];
+
+/** What the colours mean, for those of slices and map. */
+export function legendOfShades() {
+  return SHADES.map(([name, colour]) => {
+    const dot = element("i", { "aria-hidden": "true" });
+    dot.style.background = `var(--${colour})`;
+    return element("span", { class: "swatch" }, dot, name);
+  });
+}
 
 // Lets the page draw and hear; a timer would wait for 4 ms each time.
 export function breathe() {
@@ -46,13 +55,8 @@ export class ExploreMap {
       choose(this.at(Math.floor((CELLS * offsetX) / clientWidth), CELLS - 1 - Math.floor((CELLS * offsetY) / clientHeight)));
     });
     this.note = element("p", { class: "muted small", role: "status" });
-    const legend = SHADES.map(([name, colour]) => {
-      const dot = element("i", { "aria-hidden": "true" });
-      dot.style.background = `var(--${colour})`;
-      return element("span", { class: "swatch" }, dot, name);
-    });
     this.box = element("details", { class: "map" }, element("summary", {}, "Map of two parameters"),
-      element("div", { class: "controls" }, element("label", {}, "along ", this.x), element("label", {}, "up ", this.y)), this.canvas, element("p", { class: "legend" }, ...legend), this.note);
+      element("div", { class: "controls" }, element("label", {}, "along ", this.x), element("label", {}, "up ", this.y)), this.canvas, this.note);
     this.box.addEventListener("toggle", () => this.draw());
     document.addEventListener("theme", () => this.draw());
   }

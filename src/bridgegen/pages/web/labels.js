@@ -6,6 +6,7 @@ import { boxCorners, colourOf, isPlaced } from "./geometry.js";
 import { SIGNALS, lightAt } from "./unpack.js";
 import { FONT } from "./view.js";
 
+export const CROSS = 8; // pixels, half of its width
 const CAR = 8; // m²: the words of people and cycles are as long as a small car's
 
 /** @type {(a: number[], b: number[]) => number} */
@@ -29,6 +30,23 @@ export function pill(c, { width, height }, text, x, y, colour, fill = palette.la
   c.textBaseline = "middle";
   c.textAlign = "left";
   c.fillText(text, left + 7, top + h / 2 + 0.5);
+}
+
+// A cross where a contact began.
+export function drawCross(c, x, y) {
+  const r = 0.7 * CROSS;
+  c.lineCap = "round";
+  for (const [colour, pixels] of [[palette.card, 5.5], [palette.hit, 3]]) {
+    c.strokeStyle = colour;
+    c.lineWidth = pixels;
+    c.beginPath();
+    for (const side of [-1, 1]) {
+      c.moveTo(x - r, y - side * r);
+      c.lineTo(x + r, y + side * r);
+    }
+    c.stroke();
+  }
+  c.lineCap = "butt";
 }
 
 // A body's label goes to that one of eight places around it which hides least; the side away from the

@@ -43,7 +43,7 @@ class Modes {
     const notes = [], nearest = nearestToHarm();
     if (nearest !== null && !anyViolated()) notes.push(`Evaluation ${number(nearest + 1)}, which came nearest to harm, is shown below.`);
     if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
-    if (found.matters) notes.push(`What matters most: ${found.matters}${found.matters.endsWith("?") ? "" : "."}`);
+    if (found.influences.length) notes.push(`What matters most: ${found.influences.slice(0, 3).map(({ name }) => name).join(", ")}.`);
     if (found.more) notes.push(`${number(found.more)} more not shown.`);
     $("modes-note").textContent = notes.join(" ");
   }

@@ -16,8 +16,8 @@ import { stateWords } from "./words.js";
 const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 const PLAY_ICON = "M4 2v12l10-6z";
 const PAUSE_ICON = "M3 2h4v12H3zM9 2h4v12H9z";
-/** @type {["zoom-fit" | "zoom-all" | "follow", "conflict" | "all" | "ego"][]} */
-const FRAMINGS = [["zoom-fit", "conflict"], ["zoom-all", "all"], ["follow", "ego"]];
+/** @type {["zoom-fit" | "zoom-all" | "follow" | "chase", "conflict" | "all" | "ego" | "chase"][]} */
+const FRAMINGS = [["zoom-fit", "conflict"], ["zoom-all", "all"], ["follow", "ego"], ["chase", "chase"]];
 
 const clockWords = ({ time, distance }) => `${time.toFixed(2)}\u00a0s  ·  distance\u00a0${distance === null ? "–" : `${distance.toFixed(2)}\u00a0m`}`;
 
@@ -239,7 +239,7 @@ export class Player {
     this.describe(state, weather);
     this.drawn = {
       scenario: this.kept.name, chosen: this.chosen, position: this.position, ...state,
-      screen: state.entities.map((s, e) => (isPlaced(s) ? this.scene.view.toScreen(boxCentre(this.kept.entities[e], s.x, s.y, s.h)) : null)),
+      screen: this.scene.pixels ?? state.entities.map((s, e) => (isPlaced(s) ? this.scene.view.toScreen(boxCentre(this.kept.entities[e], s.x, s.y, s.h)) : null)),
       scale: this.scene.view.scale, labels: this.scene.labels.boxes, crosses: this.scene.crosses,
       lights: this.kept.lamps.map((lamp) => lightAt(lamp, state.index)),
       detections: state.entities.map((_, e) => (e > 0 ? detectionAt(this.kept, e, state.index) : null)),
@@ -329,7 +329,7 @@ export class Player {
       " ": () => this.toggle(), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1), ArrowRight: () => this.step(event.shiftKey ? 10 : 1),
       ",": () => this.step(-1), ".": () => this.step(1), s: () => this.toggleLayer("sensed"), p: () => this.toggleLayer("course"), w: () => this.toggleLayer("weather"),
       g: () => this.toggleLayer("elsewhere"),
-      l: () => this.copyLink(), e: () => this.frame("ego"), a: () => this.frame("all"), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.frame("conflict"),
+      l: () => this.copyLink(), e: () => this.frame("ego"), a: () => this.frame("all"), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.frame("conflict"), b: () => this.frame("chase"),
       d: () => this.jump(this.kept.closest ?? 0), c: () => { if (this.contacts.length) this.jump(this.contacts[0]); },
       v: () => { if (!$("to-diverged").hidden) this.jump(this.kept.diverged); },
       t: () => { if (!$("to-decided").hidden) this.jump(this.kept.conflict.decided); },

@@ -3,13 +3,14 @@
 import { Atmosphere } from "./atmosphere.js";
 import { drawBody, drawLamps, drawStreetLights } from "./bodies.js";
 import { Camera } from "./camera.js";
+import { drawChase, stripes } from "./chase.js";
 import { palette } from "./colours.js";
 import { drawDecided, drawZones } from "./conflict.js";
 import { drawCourse } from "./course.js";
 import { data } from "./data.js";
 import { boxCentre, boxCorners, colourOf, isPlaced, nearestTo, playersOf, stateAt } from "./geometry.js";
 import { drawElsewhere } from "./ghosts.js";
-import { Labels, drawScaleBar, labelLamps, pill, pointTo } from "./labels.js";
+import { CROSS, Labels, drawCross, drawScaleBar, labelLamps, pill, pointTo } from "./labels.js";
 import { measured } from "./numbers.js";
 import { detectedBoxes, drawDetections } from "./senses.js";
 import { detectionAt, showsAt, unpackLine, weatherAt } from "./unpack.js";
@@ -34,6 +35,7 @@ export class Scene {
 
   show(kept) {
     this.kept = kept;
+    this.solid = null;
     this.labels = new Labels(kept);
     this.outlines = data.roads[kept.road].map(({ kind, points }) => {
       const path = new Path2D();
@@ -49,10 +51,28 @@ export class Scene {
     this.camera = new Camera(this.view, kept, this.centres);
   }
 
+  // The road as areas and stripes with their colours, for the view in perspective.
+  get road() {
+    this.solid ??= data.roads[this.kept.road].map(({ kind, points }) => {
+      const line = unpackLine(points);
+      if (kind in AREAS) return { colour: AREAS[kind], polygons: [line] };
+      const [colour, width, dashes] = LINES[kind];
+      return { colour, polygons: stripes(line, width, dashes.length ? dashes : undefined), isLine: true };
+    });
+    return this.solid;
+  }
+
   draw(state) {
     const { context: c, width, height, ratio } = fitCanvas(this.canvas);
     this.size = { width, height };
     if (!width || !height) return; // not laid out yet
+    if (this.view.framing === "chase") {
+      this.labels.boxes = this.crosses = [];
+      const weather = this.layers.weather ? weatherAt(this.kept, state.index) : null;
+      this.pixels = drawChase(c, this.size, this.kept, state, { orbit: this.view.orbit, road: this.road, centres: this.centres, hits: this.hits, weather });
+      return;
+    }
+    this.pixels = null;
     this.camera.aim(state);
     const { x, y, scale } = this.view;
     c.fillStyle = palette.ground;
@@ -195,20 +215,8 @@ export class Scene {
     for (const [k, gap] of this.hits) {
       if (k > state.index) continue;
       const [x, y] = this.view.toScreen([(gap.from[0] + gap.to[0]) / 2, (gap.from[1] + gap.to[1]) / 2]);
-      const r = 8;
-      this.crosses.push([x - r, y - r, x + r, y + r]);
-      c.lineCap = "round";
-      for (const [colour, pixels] of [[palette.card, 5.5], [palette.hit, 3]]) {
-        c.strokeStyle = colour;
-        c.lineWidth = pixels;
-        c.beginPath();
-        for (const [a, b] of [[-1, -1], [-1, 1]]) {
-          c.moveTo(x + a * r * 0.7, y + b * r * 0.7);
-          c.lineTo(x - a * r * 0.7, y - b * r * 0.7);
-        }
-        c.stroke();
-      }
-      c.lineCap = "butt";
+      this.crosses.push([x - CROSS, y - CROSS, x + CROSS, y + CROSS]);
+      drawCross(c, x, y);
     }
   }
 }

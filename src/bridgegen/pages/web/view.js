@@ -14,6 +14,7 @@ export function fitCanvas(canvas, options) {
 }
 
 export const FONT = '600 12px system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif';
+const TURN = 0.006; // rad for each pixel that is dragged
 const ABOVE = 46;
 const BELOW = 38; // pixels that the clock and the scale bar take
 
@@ -25,7 +26,8 @@ export class View {
     this.x = this.y = 0;
     this.scale = 6;
     this.factor = 1; // the reader's own zoom, where the camera chooses the scale
-    /** @type {"conflict" | "all" | "ego" | null} what the camera shows; null once the reader has moved the view */
+    this.orbit = { yaw: 0, pitch: 0.26, away: 17 }; // of the eye about the ego [rad, rad, m], in perspective
+    /** @type {"conflict" | "all" | "ego" | "chase" | null} what the camera shows; null once the reader has moved the view */
     this.framing = "all";
     this.listen();
   }
@@ -61,6 +63,10 @@ export class View {
 
   // Keeps the world's point at the pixel `at` in its place.
   zoom(factor, at = null) {
+    if (this.framing === "chase") {
+      this.orbit.away = Math.min(150, Math.max(6, this.orbit.away / factor));
+      return void this.changed();
+    }
     const { clientWidth: width, clientHeight: height } = this.canvas;
     const scale = Math.min(60, Math.max(0.5, this.scale * factor));
     const [px, py] = at ?? [width / 2, height / 2];
@@ -74,6 +80,11 @@ export class View {
   }
 
   move(dx, dy) {
+    if (this.framing === "chase") {
+      this.orbit.yaw -= TURN * dx;
+      this.orbit.pitch = Math.min(Math.PI / 2, Math.max(0.05, this.orbit.pitch + TURN * dy));
+      return void this.changed();
+    }
     this.x -= dx / this.scale;
     this.y += dy / this.scale;
     this.framing = null;

@@ -58,8 +58,11 @@ def influences(space: SearchSpace, X: Numbers, fails: Bool, ok: Bool) -> tuple[I
         low = high = 0
         if not parameter.kind.names and parameter.kind.turn is None:
             end = END * (parameter.high - parameter.low)
-            low = int((V[:, k] <= parameter.low + end).sum())
-            high = int((V[:, k] >= parameter.high - end).sum())
+            # What begins at 0, or ends at 100 %, ends there by its nature: it cannot be widened.
+            if parameter.low != 0.0:
+                low = int((V[:, k] <= parameter.low + end).sum())
+            if (parameter.high, parameter.unit) != (100.0, "%"):
+                high = int((V[:, k] >= parameter.high - end).sum())
         found.append(
             Influence(
                 name=name, distance=float(distance), p=p, failures=len(V), at_low=low, at_high=high
