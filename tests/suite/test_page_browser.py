@@ -260,3 +260,13 @@ def test_what_is_not_judged_is_neither_passed_nor_failed(show, tmp_path, width):
     first = page.locator(".variations tbody tr").first
     assert "not judged" in first.inner_text()
     assert "jump" in first.inner_text()
+
+
+def test_on_paper_each_row_keeps_its_name(written, show):
+    _, path = written
+    page = show(path)
+    page.wait_for_selector("#change-table tr.unfolded #player:not([aria-busy])")
+    page.emulate_media(media="print")
+    assert page.locator("#change-table .open").first.is_visible()
+    assert page.locator("#table .open").first.is_visible()
+    assert not page.locator("#change-kinds button").first.is_visible()

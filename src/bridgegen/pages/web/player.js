@@ -93,7 +93,7 @@ export class Player {
     if (!partner) return;
     for (const { camera } of this.scenes) {
       camera.partner = partner;
-      camera.frame("conflict");
+      if (camera.view.framing !== "chase") camera.frame("conflict");
     }
   }
 
