@@ -50,7 +50,7 @@ def test_a_record_is_read_and_written_as_it_was():
         name: list(one) if isinstance(one, tuple) else one
         for name, one in DEFAULTS_BEFORE_FIELD.items()
         if name in NEWER
-    }
+    } | {"driver_digest": ""}
     assert (settings.budget, settings.settings["w"], settings.road_map) == (
         60,
         0.8,

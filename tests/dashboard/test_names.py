@@ -1,10 +1,13 @@
 """What scenarios and drivers are called."""
 
+import os
 from pathlib import Path
 
 import pytest
 
+from bridgegen.jobs.dashboard.project import read_project
 from bridgegen.jobs.dashboard.results import driver_of, place_of, scenario_name
+from bridgegen.jobs.suite.results import EntryResult, Header, RowResult
 
 PROJECT = Path("/srv/project")
 
@@ -54,3 +57,59 @@ def test_a_name_of_the_catalogue_stays():
 
 def test_no_absolute_path_is_shown():
     assert place_of("/home/somebody/secret/files/mine.yaml", PROJECT) == "files/mine.yaml"
+
+
+HIT = RowResult(critical=True, harm=0.5, severity=0.1, conflict="contact", partner="bv")
+
+
+def write_suite(folder: Path, time: float, ego: str, digest: str, **settings: str) -> None:
+    """Write the results of a suite with one entry."""
+    folder.mkdir(parents=True)
+    found = EntryResult(
+        entry="cut-in", ego=ego, digest="0", driver_digest=digest, scenario="cut-in", rows=[HIT]
+    )
+    lines = [Header(settings={"version": "0.9", **settings}), found]
+    path = folder / "results.jsonl"
+    path.write_text("".join(f"{line.model_dump_json()}\n" for line in lines), "utf-8")
+    os.utime(path, (time, time))
+
+
+def test_a_driver_is_one_whatever_path_names_it(tmp_path):
+    write_suite(tmp_path / "a", 1.0, "myplan.py:V2", "d1")
+    write_suite(tmp_path / "b", 2.0, "../jb/myplan.py:V2", "d1")
+    found = read_project(tmp_path)
+    assert {one.driver for one in found.results} == {found.results[0].driver}
+    assert found.results[0].driver.label == "V2"
+    assert {failure.key.driver for one in found.results for failure in one.failures} == {
+        "myplan.py:V2"
+    }
+    assert [suite.egos for suite in found.suites] == [("V2",), ("V2",)]
+
+
+def test_another_content_under_the_same_name_is_not_merged(tmp_path):
+    for k, digest in enumerate(("d1", "d2", "d1")):
+        write_suite(tmp_path / f"{k}", float(k), "myplan.py:V2", digest)
+    labels = [one.driver.label for one in read_project(tmp_path).results]
+    assert labels == ["V2", "V2 (changed)", "V2"]
+
+
+def test_results_without_a_digest_are_of_the_path_that_was_typed(tmp_path):
+    write_suite(tmp_path / "a", 1.0, "myplan.py:V2", "")
+    write_suite(tmp_path / "b", 2.0, "../jb/myplan.py:V2", "")
+    labels = {one.driver.label for one in read_project(tmp_path).results}
+    assert labels == {"myplan.py:V2", "../jb/myplan.py:V2"}
+
+
+def test_classes_of_one_name_in_other_files_keep_their_files(tmp_path):
+    write_suite(tmp_path / "a", 1.0, "mine.py:Driver", "d1")
+    write_suite(tmp_path / "b", 2.0, "theirs.py:Driver", "d2")
+    labels = {one.driver.label for one in read_project(tmp_path).results}
+    assert labels == {"mine.py:Driver", "theirs.py:Driver"}
+
+
+def test_a_user_names_a_driver(tmp_path):
+    write_suite(tmp_path / "a", 1.0, "mine.py:Driver", "d1", driver_name="planner-7")
+    write_suite(tmp_path / "b", 2.0, "mine.py:Driver", "d1")
+    found = {one.driver.label: one.driver for one in read_project(tmp_path).results}
+    assert set(found) == {"planner-7", "Driver"}
+    assert (found["planner-7"].name, found["planner-7"].version) == ("planner", "7")

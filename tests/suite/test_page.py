@@ -16,11 +16,15 @@ from tests.approval import approve
 from tests.results.test_failures import failure
 
 from bridgegen.jobs.suite import page
+from bridgegen.jobs.suite.difference import KINDS, in_order, suite_difference
+from bridgegen.jobs.suite.difference import difference as variations_compared
 from bridgegen.jobs.suite.page import FILE, write_suite_page
 from bridgegen.jobs.suite.page_payload import payload
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.sentences import difference, differences, headline
 from bridgegen.jobs.suite.suite import SuiteRun, evaluate_suite
+from bridgegen.pages.playback import Entity, Playback
+from bridgegen.pages.playbacks import diverged_at
 from bridgegen.results.failures import read_failures, write_failures
 
 CRITERIA = {"criteria": ["C-1: always(ego.v < 12 m/s)"]}
@@ -235,6 +239,35 @@ def test_a_thousand_entries_with_many_variations_fit():
         assert found["at"][0] == one.worst
 
 
+# ---- where two drivers diverge ----
+
+
+def played(x: list[float], a: list[float]) -> Playback:
+    """Return the motion of an ego alone, by its position [m] and acceleration [m/s²]."""
+    row = np.array([x])
+    return Playback(
+        name="one", rank=1, evaluation=0, parameters={}, metrics={}, critical=False,
+        time_step=0.1, entities=(Entity("ego", 4.0, 2.0, 1.4),), x=row, y=0.0 * row, h=0.0 * row,
+        v=0.0 * row, a=np.array([a]), distance=np.full(len(x), np.inf), lanes=(), n_steps=len(x),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("x", "a", "instant"),
+    [
+        ([0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 0.0], None),
+        ([0.0, 1.0, 2.09, 3.0], [0.0, 0.9, 0.0, 0.0], None),  # less than what one sees
+        ([0.0, 1.0, 2.0, 3.2], [0.0, 0.0, 0.0, 0.0], 3),  # 0.2 m apart
+        ([0.0, 1.0, 2.0, 2.9], [0.0, -4.0, -4.0, 0.0], 1),  # the command shows first
+        ([0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 0.0, -9.0], None),  # no step follows the last instant
+        ([0.0, 1.0, 2.0], [0.0, 0.0, 0.0], 2),  # it ends earlier
+    ],
+)
+def test_drivers_diverge_by_position_or_by_command(x, a, instant):
+    plain = played([0.0, 1.0, 2.0, 3.0], [0.0] * 4)
+    assert diverged_at(plain, played(x, a)) == diverged_at(played(x, a), plain) == instant
+
+
 # ---- pages of suites that ran ----
 
 
@@ -246,7 +279,8 @@ def run(folder, tmp_path):
     )  # fmt: skip
 
 
-def test_the_page_plays_the_worst_failure_of_each(run):
+def test_the_page_plays_the_worst_failure_of_each(folder, tmp_path):
+    run = evaluate_suite(folder, egos="route-follower", **CRITERIA, out=tmp_path / "one", workers=1)
     path = write_suite_page(run, run.jobs)
     assert path == run.folder / FILE
     data = data_of(path.read_text("utf-8"))
@@ -255,28 +289,72 @@ def test_the_page_plays_the_worst_failure_of_each(run):
     motions = data["suite"]["motions"]
     assert len(motions["texts"]) == len(failed)
     assert len(motions["roads"]) < len(failed)  # the same road is held once
-    cells = {
-        (entry["name"], label): cell
-        for entry in data["suite"]["entries"]
-        for label, cell in zip(data["suite"]["egos"], entry["results"], strict=True)
-    }
+    cells = {entry["name"]: entry["results"][0] for entry in data["suite"]["entries"]}
     for one in failed:
-        motion = unpacked(motions["texts"][cells[one.entry, one.ego]["motion"]])
+        motion = unpacked(motions["texts"][cells[one.entry]["motion"]])
         row = one.rows[one.worst]
         assert motion["evaluation"] == one.worst
         assert bool(motion["contacts"]) == bool(row.collisions)
-        assert motions["names"][cells[one.entry, one.ego]["motion"]] == f"{one.entry} ({one.ego})"
+        assert "twin" not in motion
+        assert motions["names"][cells[one.entry]["motion"]] == f"{one.entry} ({one.ego})"
     assert path.read_bytes() == write_suite_page(run, run.jobs).read_bytes()
 
 
-def test_there_are_at_most_so_many_playbacks_the_most_severe(run, monkeypatch):
-    monkeypatch.setattr(page, "MOST_PLAYBACKS", 1)
+def test_of_two_drivers_the_page_plays_both_where_something_changes(run):
+    found = suite_difference(run)
     suite = data_of(write_suite_page(run, run.jobs).read_text("utf-8"))["suite"]
-    failed = [one for one in run.results if one.verdict == "failed"]
-    most = max(one.rows[one.worst].severity for one in failed)
-    (name,) = suite["motions"]["names"]
-    (played,) = [one for one in failed if f"{one.entry} ({one.ego})" == name]
-    assert played.rows[played.worst].severity == most
+    changed, motions = suite["changed"], suite["motions"]
+    table = unpacked(changed["rows"])
+    assert changed["headline"] == found.headline
+    assert dict(changed["kinds"]) == found.kinds
+    assert changed["silent"] == []
+    assert len(table["row"]) == sum(row.run for row in found.rows)
+    assert table["kind"] == sorted(table["kind"])  # the most important first
+    played = [k for k, motion in enumerate(table["motion"]) if motion >= 0]
+    assert sum(KINDS[table["kind"][k]] in ("broken", "fixed") for k in played) >= 1
+    names = [entry["name"] for entry in suite["entries"]]
+    for k in played:
+        motion = unpacked(motions["texts"][table["motion"][k]])
+        name = names[table["entry"][k]]
+        assert motion["name"] == f"{name}, variation {table['row'][k] + 1}"
+        for ego, one in zip(run.egos, (motion["twin"], motion), strict=True):
+            (result,) = [each for each in run.of_ego(ego) if each.entry == name]
+            assert bool(one["contacts"]) == bool(result.rows[table["row"][k]].collisions)
+
+
+def test_there_are_at_most_so_many_playbacks_the_most_important(run, monkeypatch):
+    monkeypatch.setattr(page, "MOST_PAIRS", 1)
+    changed = data_of(write_suite_page(run, run.jobs).read_text("utf-8"))["suite"]["changed"]
+    kinds = suite_difference(run).kinds
+    table = unpacked(changed["rows"])
+    assert [k for k, motion in enumerate(table["motion"]) if motion >= 0] == [0]
+    left = {kind: kinds[kind] for kind in KINDS[:4] if kinds[kind]}
+    left[KINDS[table["kind"][0]]] -= 1
+    assert dict(changed["silent"]) == {kind: n for kind, n in left.items() if n}
+
+
+def test_the_headline_of_a_difference_counts_each_variation_once():
+    def hit(severity: float) -> RowResult:
+        return HIT.model_copy(update={"severity": severity})
+
+    rows = [  # of the first and of the second driver
+        (HIT, KEPT), (KEPT, HIT), (KEPT, HIT),
+        (HIT, hit(0.2)), (HIT, hit(0.0)), (HIT, hit(0.1 + 9e-5)),  # the last one reads the same
+        (KEPT, KEPT), (JUMP, KEPT),
+    ]  # fmt: skip
+    first, second = (
+        [result("e", ego, tuple(pair[k] for pair in rows))] for k, ego in enumerate("ab")
+    )
+    found = variations_compared(first, second, ("V1", "V2"))
+    assert found.headline == (
+        "V2 against V1: fixes 1, breaks 2, 1 worse, 1 milder of 7 variations; 1 not comparable"
+    )
+    assert found.kinds == {
+        "broken": 2, "fixed": 1, "worse": 1, "milder": 1, "same": 2, "not comparable": 1,
+    }  # fmt: skip
+    assert [row.kind for row in in_order(found)] == [
+        "broken", "broken", "fixed", "worse", "milder", "same", "same", "not comparable",
+    ]  # fmt: skip
 
 
 def test_no_playback_of_files_that_have_changed(run, folder):
@@ -322,7 +400,8 @@ def test_the_page_begins_with_the_verdict(tmp_path, outcomes, kind):
     (banner,) = re.findall(r'<div class="banner (\w*)" role="status">.*?<p>(.*?)</p>', text)
     assert banner[0] == kind
     if len(outcomes) == 2:
-        assert banner[1].startswith("b: ")
+        words = "fixes 1, breaks 0" if outcomes["a"] is HIT else "fixes 0, breaks 1"
+        assert banner[1] == f"b against a: {words}, 0 worse, 0 milder of 1 variation."
 
 
 def test_hostile_texts_stay_texts(tmp_path):

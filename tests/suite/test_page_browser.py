@@ -74,7 +74,8 @@ def test_a_failure_opens_with_its_playback(written, show, width):
     assert "1 did not run" in page.inner_text("#result")
     worst = next(one for one in run.results if one.verdict == "failed")
     page.locator("#table .open", has_text=worst.entry).click()
-    page.wait_for_function("bridgegen.state() !== null")
+    page.wait_for_selector("#table .playback #player:not([aria-busy])")
+    assert page.locator("#change-table tr.unfolded").count() == 0  # there is one player
     assert page.evaluate("bridgegen.state().scenario").startswith(worst.entry)
     rows = page.locator(".variations tbody tr")
     assert rows.count() == len(worst.rows)
@@ -84,10 +85,8 @@ def test_a_failure_opens_with_its_playback(written, show, width):
     before = page.evaluate("bridgegen.state().position")
     page.evaluate("bridgegen.seek(3)")
     assert page.evaluate("bridgegen.state().position") == 3 != before
-    page.locator(".tabs button", has_text="reference").click()
-    page.wait_for_function(
-        "document.querySelector('.tabs [aria-pressed=true]').textContent.startsWith('reference')"
-    )
+    page.locator("td > .tabs button", has_text="reference").click()
+    page.wait_for_selector("td > .tabs [aria-pressed=true]:has-text('reference')")
     page.locator("#table .open", has_text=worst.entry).click()
     assert page.locator(".variations").count() == 0
     assert page.evaluate(
@@ -96,11 +95,67 @@ def test_a_failure_opens_with_its_playback(written, show, width):
 
 
 def test_a_link_opens_the_playback_at_its_time(written, show):
-    run, path = written
-    worst = next(one for one in run.results if one.verdict == "failed")
-    page = show(path, f"#{worst.entry}%20({worst.ego})@1.5")
-    page.wait_for_function("bridgegen.state() !== null && bridgegen.state().time === 1.5")
-    assert page.evaluate("bridgegen.state().scenario") == f"{worst.entry} ({worst.ego})"
+    _, path = written
+    page = show(path)
+    page.wait_for_selector("#change-table tr.unfolded #player:not([aria-busy])")
+    name = page.locator("#change-table .open").nth(1).inner_text().removeprefix("▸ ")
+    page = show(path, f"#{name.replace(' ', '%20')}@1.5")
+    page.wait_for_selector("#change-table tr.unfolded #player:not([aria-busy])")
+    assert page.evaluate("bridgegen.state().scenario") == name
+    assert page.evaluate("bridgegen.state().time") == 1.5
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_two_drivers_play_in_step_from_where_they_diverge(written, show, width):
+    """The first change is open: both scenes on one clock, side by side where there is room."""
+    _, path = written
+    page = show(path, width=width)
+    page.wait_for_selector("#change-table tr.unfolded #player:not([aria-busy])")
+    first = page.locator("#change-table > tbody > tr").first
+    assert first.locator(".open").get_attribute("aria-expanded") == "true"
+    state = page.evaluate("bridgegen.state()")
+    assert state["index"] == state["twin"]["index"] == state["diverged"] > 0
+    assert not state["playing"]
+    assert page.inner_text("#flag") == "drivers diverge here"
+    assert page.locator("#ticks .diverged").count() == 1
+    here, there = (page.locator(f"#{name}").bounding_box() for name in ("twin-scene", "scene"))
+    if width == 1440:
+        assert (here["y"], here["x"] + here["width"] <= there["x"]) == (there["y"], True)
+    else:
+        assert (here["x"], here["y"] + here["height"] <= there["y"]) == (there["x"], True)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    before = page.evaluate("(bridgegen.seek(bridgegen.state().diverged - 1), bridgegen.state())")
+    ego = [each["entities"][0] for each in (before, before["twin"])]
+    assert abs(ego[0]["x"] - ego[1]["x"]) <= 0.1
+    page.locator("#scene").focus()
+    page.keyboard.press("End")
+    end = page.evaluate("bridgegen.state()")
+    ego = [each["entities"][0] for each in (end, end["twin"])]
+    assert abs(ego[0]["x"] - ego[1]["x"]) + abs(ego[0]["y"] - ego[1]["y"]) > 0.1
+    page.keyboard.press("v")
+    assert page.evaluate("bridgegen.state().index") == state["diverged"]
+    page.keyboard.press("Home")
+    page.locator("#to-diverged").click()
+    assert page.evaluate("bridgegen.state().index") == state["diverged"]
+
+
+def test_changes_are_filtered_by_kind(written, show):
+    _, path = written
+    page = show(path)
+    page.wait_for_selector("#change-table tr.unfolded #player:not([aria-busy])")
+    for kind, n in page.evaluate("bridgegen.data.suite.changed.kinds"):
+        chosen = page.locator(f"#change-kinds button[data-kind='{kind}']")
+        if kind == "not comparable":
+            assert chosen.count() == 0
+            continue
+        assert chosen.inner_text() == f"{kind} ({n})"
+        assert chosen.is_disabled() == (n == 0)
+        if n:
+            chosen.focus()
+            page.keyboard.press("Enter")
+            said = page.locator("#change-table .kind").all_inner_texts()
+            assert said == [kind] * min(n, 50)
+    page.wait_for_selector("#change-table td.picture .glyph, #table .picture .glyph")
 
 
 def test_the_broken_file_has_its_reason(written, show):
@@ -205,3 +260,13 @@ def test_what_is_not_judged_is_neither_passed_nor_failed(show, tmp_path, width):
     first = page.locator(".variations tbody tr").first
     assert "not judged" in first.inner_text()
     assert "jump" in first.inner_text()
+
+
+def test_on_paper_each_row_keeps_its_name(written, show):
+    _, path = written
+    page = show(path)
+    page.wait_for_selector("#change-table tr.unfolded #player:not([aria-busy])")
+    page.emulate_media(media="print")
+    assert page.locator("#change-table .open").first.is_visible()
+    assert page.locator("#table .open").first.is_visible()
+    assert not page.locator("#change-kinds button").first.is_visible()

@@ -179,3 +179,31 @@ def test_conditions_are_checked_before_anything_runs(tmp_path):
     assert read.conditions[0].comparisons == (Comparison("failed", ">", 2.0),)
     with refuses(InputError, "faild", "--fail-if"):
         SuiteCriteria.read(["faild > 2"], None)
+
+
+def test_a_suite_calls_its_driver_by_its_name(folder, tmp_path):
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "import numpy as np\nfrom bridgegen.drivers.interface import Control\n\n\n"
+        "class Mine:\n    def reset(self, n, scene):\n        self.n = n\n\n"
+        "    def act(self, observation):\n"
+        "        return Control(np.zeros(self.n), np.zeros(self.n))\n",
+        "utf-8",
+    )
+    options = {"egos": f"{mine}:Mine", "workers": 1}
+    found = evaluate_suite(folder / "plain.xosc", **options, out=tmp_path / "out")
+    assert found.labels == ("Mine",)
+    assert found.results[0].driver_digest
+    named = evaluate_suite(
+        folder / "plain.xosc", **options, driver_name="planner 7", out=tmp_path / "named"
+    )
+    assert named.labels == read_suite(tmp_path / "named").labels == ("planner 7",)
+    assert {result.driver for result in named.results} == {"planner 7"}
+    shutil.copy(mine, folder / "mine.py")
+    twice = evaluate_suite(
+        folder / "plain.xosc", egos=[f"{mine}:Mine", f"{folder}/mine.py:Mine"], workers=1,
+        out=tmp_path / "twice",
+    )  # fmt: skip
+    assert twice.labels == (f"{mine}:Mine", f"{folder}/mine.py:Mine")
+    with refuses(InputError, "--name", "--ego"):
+        evaluate_suite(folder, driver_name="planner 7", out=tmp_path / "none")

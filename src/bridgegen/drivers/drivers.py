@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
 from typing import Self
@@ -75,6 +75,7 @@ class Driver:
             ``file.py:Class``, ``file.fmu``.
         domain: where it means to drive: words of `bridgegen.drivers.planners.DOMAINS`;
             empty: it does not say.
+        called: what the user calls it (``--name``); empty: as its name says.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Driver:
     origin: Origin = Origin.SHIPPED
     spec: str = ""
     domain: frozenset[str] = frozenset()
+    called: str = field(default="", compare=False)
 
     @property
     def is_own(self) -> bool:
@@ -104,8 +106,9 @@ class Driver:
 
     @property
     def label(self) -> str:
-        """The name, and the idealised stages."""
-        return f"{self.name} (ideal {join(self.ideal)})" if self.ideal else self.name
+        """What it is called, and the idealised stages."""
+        name = self.called or self.name
+        return f"{name} (ideal {join(self.ideal)})" if self.ideal else name
 
     def idealised(self, stages: Iterable[str]) -> Self:
         """Return the driver with exactly these stages ideal.

@@ -175,7 +175,13 @@ class Pipeline:
                 "file's own actions move the ego; name a driver (ego)"
             )
         alone = replace(
-            options, ego=options.worse_than, worse_than=None, metrics=(), causes=False, cause=None
+            options,
+            ego=options.worse_than,
+            driver_name=None,
+            worse_than=None,
+            metrics=(),
+            causes=False,
+            cause=None,
         )
         pipeline = Pipeline(options=alone, workers=self._workers, **self._made_with)
         if pipeline.driver == self.driver:

@@ -17,6 +17,7 @@ from bridgegen.assess.cause import Counterfactual, counterfactuals
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import Driver
+from bridgegen.drivers.identity import checked_name
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.openx.opendrive.road_map import RoadMap
@@ -173,6 +174,8 @@ class Runner:
         nominal = self.concrete(space.row({}), road_map.path.name if road_map else "")
         self._take_storyboard(nominal)
         self.driver = self.embedded.program.driver
+        if options.driver_name is not None:
+            self.driver = replace(self.driver, called=checked_name(options.driver_name))
         # The driver is known only once the storyboard is compiled.
         if driver is None and self.driver != egos.STORYBOARD:  # write the file's choice, too
             self.source = _source(scenario, self.driver, road_map, space)

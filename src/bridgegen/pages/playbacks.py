@@ -40,6 +40,16 @@ APART = 0.05
 [m]."""
 
 
+DIVERGED, COMMANDED = 0.1, 1.0
+"""Distance between the ego's positions [m], and difference of its accelerations [m/s²], from which
+on two drivers have diverged.
+
+0.1 m is what one sees (two pixels of the playback), and far less than a gap that decides a
+conflict. A command shows before the position does: 1 m/s² makes 0.1 m in 0.45 s. It is more than
+drivers that keep their speed differ by, and less than braking that is meant to avoid something.
+"""
+
+
 @dataclass(frozen=True)
 class Shown:
     """A row that is played.
@@ -193,6 +203,28 @@ def _beside(label: str, playback: Playback, rollout: Rollout, row: int) -> Besid
     # At instants at which one of both is absent (NaN), nothing is compared.
     apart = np.nan_to_num(np.hypot(x, y), nan=0.0).max(axis=1, initial=0.0) > APART
     return Beside(label, tuple(np.flatnonzero(apart).tolist()), *(motion[n][apart] for n in "xyh"))
+
+
+def diverged_at(first: Playback, second: Playback) -> int | None:
+    """Return the first instant at which the ego moves otherwise with two drivers; see `DIVERGED`.
+
+    Args:
+        first: of a row with one driver.
+        second: of the same row with the other one.
+
+    Returns:
+        None if it moves alike as long as both last, and as long with one as with the other.
+    """
+    both = min(first.n_steps, second.n_steps)
+    apart = np.hypot(*(getattr(first, n)[0, :both] - getattr(second, n)[0, :both] for n in "xy"))
+    differs = apart > DIVERGED
+    if first.a is not None and second.a is not None:
+        # The last instant begins no step: no acceleration holds from there on.
+        a = np.abs(first.a[0, : both - 1] - second.a[0, : both - 1])
+        differs[: both - 1] |= a > COMMANDED
+    if differs.any():
+        return int(differs.argmax())
+    return None if first.n_steps == second.n_steps else both - 1
 
 
 def nominal_playback(pipeline: Pipeline, name: str) -> Playback:

@@ -109,7 +109,7 @@ def _print_figures(run: "Run", seconds: float) -> None:
     s, settings, found = run.summary, run.settings, run.triage
     quick = "quick causes" if found is not None else "causes"
     rows = [
-        ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}{_worse(settings)}"),
+        ("scenario", f"{Path(settings.scenario).stem}, ego {settings.called}{_worse(settings)}"),
         ("search", f"{settings.algorithm}, seed {settings.seed}"),
         ("evaluations", f"{s.evaluations}" + (f" ({s.failed} failed)" if s.failed else "")),
         *screen_rows(run),
@@ -196,7 +196,7 @@ def conclusion(run: "Run") -> str:
     from bridgegen.search.triage.record import NOT_JUDGED
 
     settings, found = run.settings, run.triage
-    name = f"{settings.ego} in {Path(settings.scenario).stem}{_worse(settings)}"
+    name = f"{settings.called} in {Path(settings.scenario).stem}{_worse(settings)}"
     word = WORDS[run.verdict]
     if found is None:
         return f"{word}  {name}: the run has not ended"

@@ -59,6 +59,17 @@ class PipelineOptions(Declared):
             names="driver",
         ),
     )
+    driver_name: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "What the driver is called on pages and in results.",
+            spelling="--name",
+            shown="as --ego names it",
+            before=None,
+            group=OF_DRIVER,
+        ),
+    )
     ideal: Sequence[str] = field(
         default=(),
         metadata=option(

@@ -95,11 +95,6 @@ class CarriedDriver:
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None
 
-    @property
-    def digest(self) -> str | None:
-        """A digest of the file; None if the driver has none."""
-        return None if self.data is None else hashlib.sha256(self.data).hexdigest()
-
     def here(self) -> str:
         """Return its name here: unchanged if the same file exists, else that of a copy."""
         path = file_of(self.name)

@@ -15,6 +15,7 @@ from bridgegen.jobs.dashboard.results_of import (
     read_map,
     read_run,
     read_suite_line,
+    with_drivers_as_one,
 )
 from bridgegen.jobs.dashboard.scenery import Sceneries, Scenery
 from bridgegen.jobs.preventability.result import SETTINGS as MAP_FILE
@@ -153,7 +154,8 @@ class _Reader:
     def project(self) -> Project:
         """Return all that was read."""
         decisions = self._decisions()
-        results = (*self.runs, *(result for suite in self.suites for result in suite.results))
+        runs, suites = with_drivers_as_one(self.runs, self.suites)
+        results = (*runs, *(result for suite in suites for result in suite.results))
         unread = sorted(
             {result.scenario for result in results if result.seen is None and result.finished}
         )
@@ -163,8 +165,8 @@ class _Reader:
             problems.append(Problem(f"scenario {name}", why))
         return Project(
             self.root,
-            tuple(self.runs),
-            tuple(self.suites),
+            runs,
+            suites,
             tuple(self.maps),
             tuple(self.comparisons),
             self.sceneries.by_name(self.root),

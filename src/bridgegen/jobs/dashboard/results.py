@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
 from bridgegen.drivers import is_remote, is_spec
+from bridgegen.drivers.identity import Identity, identity_of, labels_of
 from bridgegen.scenario.language.criteria import Criterion
 from bridgegen.search.triage.record import Estimate
 
@@ -16,6 +17,7 @@ from bridgegen.search.triage.record import Estimate
 
 _VERSION = re.compile(r"[-_@]v?([0-9]+(?:[._][0-9]+)*)$")
 _SUFFIXES = (".py", ".fmu")
+_UNKNOWN = Identity("", "")
 
 
 @dataclass(frozen=True, order=True)
@@ -27,11 +29,13 @@ class Driver:
         version: of the name, "1.2" of ``stack-1.2``; of a driver that ships BridgeGen's; "" where
             nothing says it.
         label: as people call it.
+        identity: by its content; empty where no file of it is known.
     """
 
     name: str
     version: str
     label: str
+    identity: Identity = _UNKNOWN
 
 
 def scenario_name(text: str, project: Path, distribution: str = "") -> str:
@@ -47,7 +51,9 @@ def scenario_name(text: str, project: Path, distribution: str = "") -> str:
     return place_of(given, project) if is_path else given
 
 
-def driver_of(text: str, project: Path, bridgegen: str) -> Driver:
+def driver_of(
+    text: str, project: Path, bridgegen: str, digest: str = "", called: str = ""
+) -> Driver:
     """Return the driver of a result.
 
     A version ends a part of the name behind ``-``, ``_`` or ``@``: ``stack-1.2``,
@@ -57,7 +63,13 @@ def driver_of(text: str, project: Path, bridgegen: str) -> Driver:
         text: as a run or suite records it.
         project: folder of the project.
         bridgegen: version of BridgeGen that made the result.
+        digest: of its files, as recorded; "" of earlier results and of drivers without files.
+        called: the name that the user gave it (``--name``), or "".
     """
+    if digest or called:
+        plain = driver_of(called or text, project, bridgegen)
+        label = called or plain.label
+        return Driver(plain.name, plain.version, label, identity_of(text, digest, called))
     if is_remote(text):
         return Driver(text, "", text)
     if not is_spec(text):
@@ -289,6 +301,37 @@ def current(results: Iterable[Result]) -> list[Result]:
             [result for result in some if result.driver.version == version] if version else [last]
         )
     return in_order(found)
+
+
+def as_one(results: Iterable[Result]) -> dict[Driver, Driver]:
+    """Return what each driver with an identity is called in all results: one of one content.
+
+    Its name is that of its first result, whatever path later ones give. Its label is its class
+    alone if no file of another name has such a class. Later contents under a label are "changed".
+    """
+    drivers = [result.driver for result in in_order(results) if result.driver.identity.content]
+    first: dict[Identity, Driver] = {}
+    for driver in drivers:
+        first.setdefault(driver.identity, driver)
+    files: dict[str, set[str]] = {}
+    for identity, driver in first.items():
+        files.setdefault(identity.name, set()).add(PurePosixPath(driver.name).name)
+    plain = [
+        driver.label
+        if driver.version
+        else PurePosixPath(driver.label).name
+        if len(files[identity.name]) > 1
+        else identity.name
+        for identity, driver in first.items()
+    ]
+    labels = labels_of(
+        [Identity(name, own.content) for name, own in zip(plain, first, strict=True)]
+    )
+    made = {
+        own: replace(driver, label=label)
+        for (own, driver), label in zip(first.items(), labels, strict=True)
+    }
+    return {driver: made[driver.identity] for driver in drivers}
 
 
 def versions(results: Iterable[Result]) -> Mapping[str, list[Driver]]:

@@ -1,6 +1,6 @@
 """Folders of a project become results: runs, suites, and those that test no driver for failures."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
@@ -14,6 +14,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError, StorageError
 from bridgegen.base.records import parse_json, read_bytes, read_model
 from bridgegen.drivers.drivers import join
+from bridgegen.drivers.identity import Identity
 from bridgegen.jobs.compare.plan import FILE as COMPARISON_FILE
 from bridgegen.jobs.compare.result import PAGE as COMPARISON_PAGE
 from bridgegen.jobs.dashboard.results import (
@@ -23,6 +24,7 @@ from bridgegen.jobs.dashboard.results import (
     ModeKey,
     Result,
     Seen,
+    as_one,
     driver_of,
     scenario_name,
 )
@@ -62,10 +64,15 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
         raise StorageError(line.problem)
     distribution = str(settings.distribution or "")
     scenario = scenario_name(settings.scenario, project, distribution)
-    driver = driver_of(settings.ego, project, line.version)
+    driver = driver_of(
+        settings.ego, project, line.version, settings.driver_digest, settings.driver_name or ""
+    )
     if settings.ideal:
         stages = f" (ideal {join(settings.ideal)})"
-        driver = Driver(driver.name + stages, driver.version, driver.label + stages)
+        own = driver.identity
+        if own.content:
+            own = Identity(own.name + stages, own.content + stages)
+        driver = Driver(driver.name + stages, driver.version, driver.label + stages, own)
     bound = line.triage.bound if line.triage else None
     judged = tuple(map(_judged, line.criteria))
     other = settings.worse_than
@@ -210,9 +217,9 @@ def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteL
     suite = read_suite(folder)
     source, time = folder.relative_to(project).as_posix(), (folder / RESULTS).stat().st_mtime
     page = f"{source}/{PAGE}" if (folder / PAGE).is_file() else ""
-    made = str(suite.settings.get("version", ""))
+    made, called = (str(suite.settings.get(key) or "") for key in ("version", "driver_name"))
     results = tuple(  # the file has them as they ended
-        _result(project, source, page, time, made, result, sceneries)
+        _result(project, source, page, time, made, called, result, sceneries)
         for result in sorted(suite.results, key=lambda result: (result.entry, result.ego))
     )
     egos = tuple(dict.fromkeys(result.driver.label for result in results))
@@ -256,12 +263,17 @@ def _result(
     page: str,
     time: float,
     made: str,
+    called: str,
     entry_result: EntryResult,
     sceneries: Sceneries,
 ) -> Result:
     scenario = scenario_name(entry_result.scenario, project, entry_result.distribution)
     driver = driver_of(
-        entry_result.ego or entry_result.driver or "the scenario's own", project, made
+        entry_result.ego or entry_result.driver or "the scenario's own",
+        project,
+        made,
+        entry_result.driver_digest,
+        called,
     )
     judged = tuple(_judged_entry(entry_result))
     return Result(
@@ -363,6 +375,33 @@ def _seen_in_entry(entry_result: EntryResult, scenery: Scenery | None) -> Seen |
         elif not any(isinstance(value, str) for value in values):
             columns[name] = np.array(values, dtype=np.float64)
     return scenery.seen(columns, len(rows))
+
+
+def with_drivers_as_one(
+    runs: Sequence[Result], suites: Sequence[SuiteLine]
+) -> tuple[tuple[Result, ...], tuple[SuiteLine, ...]]:
+    """Return results in which each driver has one name, by whatever path it was named."""
+    found = as_one([*runs, *(result for suite in suites for result in suite.results)])
+
+    def renamed(result: Result) -> Result:
+        driver = found.get(result.driver, result.driver)
+        failures = tuple(
+            replace(each, key=replace(each.key, driver=driver.name)) for each in result.failures
+        )
+        return replace(result, driver=driver, failures=failures)
+
+    lines = []
+    for suite in suites:
+        results = tuple(map(renamed, suite.results))
+        egos = tuple(dict.fromkeys(result.driver.label for result in results))
+        pairs = zip(suite.results, results, strict=True)
+        label = {before.driver.label: after.driver.label for before, after in pairs}
+        change = suite.difference
+        if change is not None:
+            first, second = (label.get(name, name) for name in (change.first, change.second))
+            change = replace(change, first=first, second=second)
+        lines.append(replace(suite, egos=egos, results=results, difference=change))
+    return tuple(map(renamed, runs)), tuple(lines)
 
 
 # --- Folders that test no driver: preventability maps, comparisons ---

@@ -9,9 +9,10 @@ import numpy as np
 from bridgegen import drivers as egos
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError, Interrupted
+from bridgegen.drivers.identity import digest_of
 from bridgegen.engine.options import PipelineOptions, called_with
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.engine.workers import CarriedDriver, Lost, Workers, open_workers
+from bridgegen.engine.workers import Lost, Workers, open_workers
 from bridgegen.jobs.frame import JobCallbacks, command_of
 from bridgegen.jobs.preventability import arithmetic
 from bridgegen.jobs.preventability.classes import Codes, Outcome, outcomes
@@ -66,7 +67,7 @@ def map_preventability(given: MapOptions) -> PreventabilityMap:
         **({"vehicle": vehicle} if vehicle else {}),
         # A map may be resumed long after: a driver whose file has changed since would give another
         # map.
-        "files of drivers": {name: digest_of(name) for name in names},
+        "files of drivers": {name: digest_of(name) or None for name in names},
     }
     axes = [
         # Seventeen digits, so that the command makes the same grid to the last bit.
@@ -169,8 +170,3 @@ def _distinct(names: Iterable[str], what: str) -> tuple[str, ...]:
     if twice := sorted({name for name in found if found.count(name) > 1}):
         raise InputError(f"each {what} is named once, got twice: {', '.join(twice)}")
     return found
-
-
-def digest_of(name: str) -> str | None:
-    """Return a digest of the file of a user's driver; None where it has none."""
-    return CarriedDriver.of(name).digest

@@ -17,9 +17,10 @@ from bridgegen.assess.conflict.harm import NEAR_MISS, Count, decisive
 from bridgegen.assess.conflict.summary import summarise
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError, Interrupted, StorageError, UnknownNameError
+from bridgegen.drivers.identity import digest_of
 from bridgegen.engine.options import PipelineOptions, called_with
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.engine.workers import CarriedDriver, open_workers
+from bridgegen.engine.workers import open_workers
 from bridgegen.jobs.frame import command_of, require_ranges
 from bridgegen.jobs.risk import experiment as methods
 from bridgegen.jobs.risk.cross_simulator import HERE, kept_elsewhere, look_elsewhere
@@ -213,7 +214,7 @@ def estimate_risk(given: RiskOptions) -> Risk:
             # calls.
             "exposure": _digest(met),
             "driver": name,
-            "file of the driver": CarriedDriver.of(name).digest,
+            "file of the driver": digest_of(name) or None,
             "vehicle": vehicle,
             "event": given.event,
             "count": given.count,

@@ -16,6 +16,7 @@ from bridgegen.base.arrays import Int
 from bridgegen.base.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.base.plugins import file_of, is_own
 from bridgegen.drivers import STORYBOARD
+from bridgegen.drivers.identity import digest_of
 from bridgegen.engine.domain import outside
 from bridgegen.engine.options import SearchOptions, called_with, checked, range_problems
 from bridgegen.engine.pipeline import Pipeline
@@ -197,6 +198,7 @@ def run_search(given: SearchArguments) -> Run:
             screen_batch=None if given.screen is None else given.screen_batch or BATCH,
             seed=seed,
             ego=pipeline.driver.name,
+            driver_digest=digest_of(pipeline.driver.name),
             ideal=sorted(pipeline.driver.ideal),
             vehicle=pipeline.runner.vehicle,
             axes=[str(axis) for axis in space.axes],

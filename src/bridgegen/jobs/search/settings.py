@@ -57,6 +57,7 @@ class Settings(SearchOptions):
     Attributes:
         scenario: a name of the catalogue, or the path of a file.
         fingerprint: digest of the scenario and its distribution when the run began.
+        driver_digest: see `bridgegen.drivers.identity.digest_of`; "" in earlier runs, too.
         map_digest: SHA-256 of the map's file, where there is one.
         optimised: the objective with its weights, as ``Objective.to_dict`` gives it.
         own_metrics: what is known of the metrics of the user's own, but their code.
@@ -70,6 +71,12 @@ class Settings(SearchOptions):
     map_digest: str | None
     optimised: Mapping[str, Any]
     own_metrics: Sequence[Mapping[str, str | float]] = ()
+    driver_digest: str = ""
+
+    @property
+    def called(self) -> str:
+        """What the driver is called: as the user says, else its name."""
+        return self.driver_name or self.ego
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON's types."""
@@ -173,8 +180,8 @@ def _by_field(data: Mapping[str, Any]) -> dict[str, Any]:
         raise ValueError("chosen: must be an object")
     moved = {*RECORDED_AS, *CHOSEN}
     field_of = {key: name for name, key in RECORDED_AS.items()}
-    given = {**DEFAULTS_BEFORE_FIELD}
-    given |= {"simulator": given["simulator"].name, "simulator_settings": {}, "own_metrics": ()}
+    given = {**DEFAULTS_BEFORE_FIELD, "driver_digest": "", "own_metrics": ()}
+    given |= {"simulator": given["simulator"].name, "simulator_settings": {}}
     for key, value in data.items():
         if key != "chosen":
             given[field_of.get(key, f"'{key}'" if key in moved else key)] = value

@@ -29,6 +29,15 @@ Change = Literal["fixed", "broken", "both fail", "both pass", "not comparable"]
 
 CHANGES: tuple[Change, ...] = ("broken", "fixed", "both fail", "both pass", "not comparable")
 
+Kind = Literal["broken", "fixed", "worse", "milder", "same", "not comparable"]
+
+KINDS: tuple[Kind, ...] = ("broken", "fixed", "worse", "milder", "same", "not comparable")
+"""What a change amounts to, the most important first; each variation is of one kind."""
+
+LEAST_SEVERITY = 1e-4
+"""Least difference of two probabilities of MAIS3+ that makes a variation worse or milder. It is the
+last digit that pages show ("0.43 %"): what reads the same is called the same."""
+
 
 @dataclass(frozen=True)
 class RowChange:
@@ -50,13 +59,22 @@ class RowChange:
     harm: float
     run: bool = True
 
+    @property
+    def kind(self) -> Kind:
+        """What the change amounts to: where the verdict stays, the severity decides."""
+        if self.change in ("broken", "fixed", "not comparable"):
+            return self.change
+        if abs(self.severity) < LEAST_SEVERITY:
+            return "same"
+        return "worse" if self.severity > 0.0 else "milder"
+
 
 @dataclass(frozen=True)
 class Difference:
     """Two egos on the same variations.
 
     Attributes:
-        first: the ego that is compared with, as named.
+        first: the ego that is compared with, as people call it.
         second: the ego that is compared.
         rows: what changes in each variation; of an entry that one of them cannot run, one.
         sampled: whether the variations are a sample, so that there are confidence intervals.
@@ -72,6 +90,24 @@ class Difference:
         """The number of variations of each change."""
         found = Counter(row.change for row in self.rows)
         return {change: found[change] for change in CHANGES}
+
+    @property
+    def kinds(self) -> dict[Kind, int]:
+        """The number of variations of each kind of change."""
+        found = Counter(row.kind for row in self.rows)
+        return {kind: found[kind] for kind in KINDS}
+
+    @property
+    def headline(self) -> str:
+        """Both drivers and the numbers of variations in a line, without a full stop."""
+        kinds = self.kinds
+        n = len(self.rows) - kinds["not comparable"]
+        lost = f"; {kinds['not comparable']:,} not comparable" if kinds["not comparable"] else ""
+        return (
+            f"{self.second} against {self.first}: fixes {kinds['fixed']:,}, breaks "
+            f"{kinds['broken']:,}, {kinds['worse']:,} worse, {kinds['milder']:,} milder of {n:,} "
+            f"{'variation' if n == 1 else 'variations'}{lost}"
+        )
 
     @cached_property
     def unjudged(self) -> dict[str, str]:
@@ -129,6 +165,24 @@ def difference(
         verdicts = zip(a.verdicts, b.verdicts, strict=True)
         rows += [_change(a.entry, i, a.rows[i], b.rows[i], both) for i, both in enumerate(verdicts)]
     return Difference(*egos, tuple(rows), sampled)
+
+
+def suite_difference(suite: SuiteRun) -> Difference | None:
+    """Compare the egos of a suite; None if it has another number of them, or was stopped."""
+    if len(suite.egos) != 2:
+        return None
+    first, second = (suite.of_ego(ego) for ego in suite.egos)
+    if [result.entry for result in first] != [result.entry for result in second]:
+        return None
+    return difference(first, second, (suite.labels[0], suite.labels[1]))
+
+
+def in_order(found: Difference) -> list[RowChange]:
+    """Return the changes, the most important first: by kind, then by the change of severity."""
+    return sorted(
+        found.rows,
+        key=lambda row: (KINDS.index(row.kind), -abs(row.severity), -abs(row.harm), row.row),
+    )
 
 
 def _change(
@@ -348,5 +402,6 @@ def compare_drivers(given: DiffOptions) -> DriverDifference:
     )
     given.callbacks.stage("page")
     page = write_suite_page(suite, suite.jobs, searches=searches)
-    found = difference(suite.of_ego(egos[0]), suite.of_ego(egos[1]), egos)
+    found = suite_difference(suite)
+    assert found is not None  # two drivers, and every entry was run
     return DriverDifference(suite, found, searches, page)

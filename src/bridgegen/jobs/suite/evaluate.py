@@ -1,10 +1,7 @@
-"""An entry of a suite → its pipeline → the results of its rows, with a digest of its driver."""
+"""An entry of a suite → its pipeline → the results of its rows."""
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,13 +9,12 @@ import numpy as np
 from bridgegen.assess.conflict.findings import is_unsafe_start
 from bridgegen.assess.conflict.happening import Happening
 from bridgegen.base.errors import BridgeGenError, InputError
-from bridgegen.drivers import is_remote
-from bridgegen.drivers.address import Command, address_of
+from bridgegen.drivers.identity import digest_of
 from bridgegen.engine.domain import outside
 from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.engine.workers import CarriedDriver, Threads
+from bridgegen.engine.workers import Threads
 from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load
 from bridgegen.jobs.suite.clauses import judged
 from bridgegen.jobs.suite.entries import Entry
@@ -31,45 +27,6 @@ from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.simulation.rollout import STATUS_MESSAGES
-
-# --- A digest of a user's driver: whether results are those of the driver as it is now ---
-
-
-def driver_digest(name: str) -> str:
-    """Return a digest of the files that a driver's name holds, not of what they import.
-
-    Empty where it holds none: a driver that ships, in a package, or of a server.
-    """
-    try:
-        if is_remote(name):
-            return _digest_of_command(name)
-        data = CarriedDriver.of(name).data
-    except (InputError, OSError, ValueError):
-        return ""
-    return "" if data is None else hashlib.sha256(data).hexdigest()
-
-
-def _digest_of_command(name: str) -> str:
-    """Return a digest of a program and of the files among its arguments."""
-    command = address_of(name)
-    if not isinstance(command, Command):
-        return ""
-    digest = hashlib.sha256()
-    for path in (Path(word) for word in (command.program or "", *command.words[1:])):
-        if path.is_file():
-            stat = path.stat()
-            # Asked for each entry of a suite: a file is read once, and again if its time or size
-            # changes.
-            digest.update(_digest_of_file(path, stat.st_mtime_ns, stat.st_size))
-    return digest.hexdigest()
-
-
-@lru_cache(maxsize=64)
-def _digest_of_file(path: Path, modified: int, size: int) -> bytes:
-    """Return the digest of a file that was modified then."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").digest()
-
 
 AT_ONCE = 512
 """Number of rows that are evaluated together; no result depends on it."""
@@ -108,8 +65,8 @@ class Job:
 
     @property
     def driver_digest(self) -> str:
-        """A digest of the files of a driver of the user's; else empty."""
-        return driver_digest(self.ego) if self.ego else ""
+        """See `bridgegen.drivers.identity.digest_of`; empty of a scenario's own driver."""
+        return digest_of(self.ego) if self.ego else ""
 
     def is_of(self, result: EntryResult) -> bool:
         """Whether a result is that of the files as they are now."""

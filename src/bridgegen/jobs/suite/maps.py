@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.drivers.identity import digest_of
 from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.jobs.preventability.classes import CellClass
 from bridgegen.jobs.preventability.grid import coarse_axes
 from bridgegen.jobs.preventability.page import COLOURS, data_uri
-from bridgegen.jobs.preventability.preventability import digest_of, map_preventability
+from bridgegen.jobs.preventability.preventability import map_preventability
 from bridgegen.jobs.preventability.result import PreventabilityMap
 from bridgegen.jobs.search.scenarios import driven_by, load
 from bridgegen.jobs.suite.suite import SuiteRun
@@ -70,7 +71,7 @@ def map_suite(
 
 def _folder(scenario: LogicalScenario, egos: list[str]) -> str:
     """Return a folder's name, another one where a map would be another."""
-    settings = [scenario.fingerprint, {ego: digest_of(ego) for ego in egos}]
+    settings = [scenario.fingerprint, {ego: digest_of(ego) or None for ego in egos}]
     digest = hashlib.sha256(json.dumps(settings).encode()).hexdigest()
     return f"{scenario.name}-{digest[:8]}"
 

@@ -126,6 +126,7 @@ class SuiteOptions(ScenariosOptions):
             names="simulator",
         ),
     )
+    driver_name: str | None = field(default=None, metadata=_of_search("driver_name"))
     with_maps: bool = field(
         default=False,
         metadata=option(

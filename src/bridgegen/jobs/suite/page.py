@@ -10,10 +10,10 @@ from bridgegen.base.errors import BridgeGenError
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.option import options_of
 from bridgegen.jobs.preventability.result import PreventabilityMap
-from bridgegen.jobs.suite.difference import WorseThan
+from bridgegen.jobs.suite.difference import Difference, WorseThan, in_order, suite_difference
 from bridgegen.jobs.suite.evaluate import Job, pipeline_of, rows_of_job
 from bridgegen.jobs.suite.maps import picture_payload
-from bridgegen.jobs.suite.page_payload import Key, key_of, payload
+from bridgegen.jobs.suite.page_payload import Key, Motion, key_of, payload
 from bridgegen.jobs.suite.replay import Replayed, replay_command
 from bridgegen.jobs.suite.results import EntryResult, rank
 from bridgegen.jobs.suite.suite import SuiteRun
@@ -28,6 +28,11 @@ FILE = "suite.html"
 
 MOST_PLAYBACKS = 50
 """Maximum number of playbacks in a page."""
+
+MOST_PAIRS = 200
+"""Maximum number of variations that a page plays with two egos."""
+
+PLAYED = ("broken", "fixed", "worse", "milder")
 
 _MODULE = "suite.js"
 
@@ -62,7 +67,9 @@ def write_suite_page(
         for result in suite.results
         if result.verdict == "failed" and key_of(result) in by_key
     }
-    return _write(suite, dict(_playbacks(suite, by_key)), commands, searches, maps)
+    found = suite_difference(suite)
+    motions = _worst(suite, by_key) if found is None else _pairs(suite, by_key, found)
+    return _write(suite, list(motions), commands, searches, maps)
 
 
 def write_replay_page(made: Replayed) -> Path:
@@ -79,13 +86,13 @@ def write_replay_page(made: Replayed) -> Path:
     suite = SuiteRun(made.folder, (result.ego,), (result,), {})
     job = replace(made.job, entry=replace(made.job.entry, name=name))
     playback = _playback(job, result, 0)
-    played = {} if playback is None else {key_of(result): playback}
+    played = [] if playback is None else [Motion(name, (result.ego,), 0, playback)]
     return _write(suite, played, {key_of(result): made.command})
 
 
 def _write(
     suite: SuiteRun,
-    played: Mapping[Key, Playback],
+    played: Sequence[Motion],
     commands: Mapping[Key, str],
     searches: Sequence[WorseThan] = (),
     maps: Sequence[PreventabilityMap] = (),
@@ -103,16 +110,15 @@ def _write(
 
 def _banner(suite: SuiteRun, page: Mapping[str, Any]) -> Banner:
     """Return the verdict on all egos; of two, on the second, and what it fixes and breaks."""
-    egos = suite.egos[-1:] if page["changes"] else suite.egos
+    egos = suite.egos[-1:] if page["changed"] else suite.egos
     verdicts = {result.verdict for ego in egos for result in suite.of_ego(ego)}
     kind, word = "passes", "PASSES"
     if "failed" in verdicts:
         kind, word = "fails", "FAILS"
     elif verdicts != {"passed"}:
         kind, word = "open", "NOT JUDGED"
-    if page["changes"]:
-        return Banner(f"{page['egos'][-1]}: {page['changes']}", kind, word)
-    return Banner(f"{'; '.join(page['headlines'])}.", kind, word)
+    said = page["changed"]["headline"] if page["changed"] else "; ".join(page["headlines"])
+    return Banner(f"{said}.", kind, word)
 
 
 def command_of(folder: Path, job: Job, result: EntryResult) -> str:
@@ -134,8 +140,19 @@ def command_of(folder: Path, job: Job, result: EntryResult) -> str:
     return shlex.join(words)
 
 
-def _playbacks(suite: SuiteRun, jobs: Mapping[Key, Job]) -> Iterator[tuple[Key, Playback]]:
-    """Yield the playbacks of the worst failed rows, the most severe first."""
+def _worst(suite: SuiteRun, jobs: Mapping[Key, Job]) -> Iterator[Motion]:
+    """Yield the motions of the worst failed rows, the most severe first."""
+    for result in _failed(suite)[:MOST_PLAYBACKS]:
+        job = jobs.get(key_of(result))
+        others = [jobs.get((result.entry, ego)) for ego in suite.egos if ego != result.ego]
+        shown = [other for other in others if other is not None]
+        playback = None if job is None else _playback(job, result, result.worst or 0, shown)
+        if playback is not None:
+            yield Motion(result.entry, (result.ego,), result.worst or 0, playback)
+
+
+def _failed(suite: SuiteRun) -> list[EntryResult]:
+    """Return the results that fail, the most severe first."""
     failed = [result for result in suite.results if result.worst is not None]
     failed.sort(
         key=lambda result: (
@@ -143,13 +160,50 @@ def _playbacks(suite: SuiteRun, jobs: Mapping[Key, Job]) -> Iterator[tuple[Key, 
             *rank(result.rows[result.worst or 0]),
         )
     )
-    for result in failed[:MOST_PLAYBACKS]:
-        job = jobs.get(key_of(result))
-        others = [jobs.get((result.entry, ego)) for ego in suite.egos if ego != result.ego]
-        shown = [other for other in others if other is not None]
-        playback = None if job is None else _playback(job, result, result.worst or 0, shown)
-        if playback is not None:
-            yield key_of(result), playback
+    return failed
+
+
+def _pairs(suite: SuiteRun, jobs: Mapping[Key, Job], found: Difference) -> Iterator[Motion]:
+    """Yield what both egos do in the variations that change, the most important first.
+
+    The worst failure of each entry comes before those that are only worse or milder.
+    """
+    changed = [(row.entry, row.row) for row in in_order(found) if row.kind in PLAYED]
+    verdicts = sum(row.kind in ("broken", "fixed") for row in found.rows)
+    worst = [(result.entry, result.worst or 0) for result in _failed(suite)[:MOST_PLAYBACKS]]
+    wanted = list(dict.fromkeys([*changed[:verdicts], *worst, *changed[verdicts:]]))[:MOST_PAIRS]
+    of_entry: dict[str, list[int]] = {}
+    for entry, number in wanted:
+        of_entry.setdefault(entry, []).append(number)
+    made = {
+        (entry, motion.row): motion
+        for entry, numbers in of_entry.items()
+        for motion in _both(suite, jobs, entry, numbers)
+    }
+    yield from (made[key] for key in wanted if key in made)
+
+
+def _both(
+    suite: SuiteRun, jobs: Mapping[Key, Job], entry: str, numbers: Sequence[int]
+) -> Iterator[Motion]:
+    """Yield the motions of some rows of an entry; none where the files have changed since."""
+    played = []
+    try:
+        for ego in suite.egos:
+            job, (result,) = (
+                jobs[entry, ego],
+                [result for result in suite.of_ego(ego) if result.entry == entry],
+            )
+            if not job.is_of(result):
+                return
+            pipeline = pipeline_of(job)
+            X = rows_of_job(job, pipeline)[list(numbers)]
+            names = [(f"{entry}, variation {number + 1}", number, ()) for number in numbers]
+            played.append(measured_playbacks(pipeline, names, X))
+    except (BridgeGenError, OSError, KeyError, IndexError):
+        return  # its results stand, and the page has the command
+    for number, first, second in zip(numbers, *played, strict=True):
+        yield Motion(entry, suite.egos, number, second, first)
 
 
 def _playback(

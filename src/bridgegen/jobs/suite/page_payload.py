@@ -2,15 +2,22 @@
 
 import json
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from bridgegen.base.physics import HARD_BRAKING
 from bridgegen.jobs.suite.clauses import clause_results
-from bridgegen.jobs.suite.difference import WorseThan
-from bridgegen.jobs.suite.difference import difference as variations_compared
+from bridgegen.jobs.suite.difference import (
+    KINDS,
+    Difference,
+    WorseThan,
+    in_order,
+    suite_difference,
+)
 from bridgegen.jobs.suite.known_failures import EXCUSED, words
-from bridgegen.jobs.suite.results import EntryResult, Outcome, Verdict, rank
+from bridgegen.jobs.suite.results import EntryResult, Outcome, RowResult, Verdict, rank
 from bridgegen.jobs.suite.sentences import (
     changes,
     clause_in_words,
@@ -18,7 +25,6 @@ from bridgegen.jobs.suite.sentences import (
     difference,
     differences,
     headline,
-    label_of,
     outcomes,
     points,
 )
@@ -27,6 +33,7 @@ from bridgegen.pages.packed import OF_ROW, deflated, road_key
 from bridgegen.pages.payload import script_json
 from bridgegen.pages.playback import Playback
 from bridgegen.pages.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
+from bridgegen.pages.playbacks import diverged_at
 
 SIZE, SIZE_OF_RESULT = 2_600_000, 600
 """Maximum number of characters of a page with 1,000 results, and how many more it may have for each
@@ -41,8 +48,34 @@ MOST_MODES = 10
 MOST_ROWS = 1000
 """Maximum number of variations that the page holds of an entry with an ego."""
 
+MOST_CHANGES = 3000
+"""Maximum number of variations that the page lists of the difference of two egos."""
+
 Key = tuple[str, str]
 """Name of an entry, and the ego as the user names it."""
+
+Played = tuple[str, str, int]
+"""The same, and the number of a row."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What the page plays of a variation.
+
+    Attributes:
+        entry: by name.
+        egos: whose variation it is: one, or both of two.
+        row: its number, from 0 on.
+        playback: with the ego; of two, with the second.
+        twin: of two, with the first.
+    """
+
+    entry: str
+    egos: tuple[str, ...]
+    row: int
+    playback: Playback
+    twin: Playback | None = None
+
 
 _LETTER: dict[Verdict, str] = {"passed": "p", "failed": "f", "not run": "n", "not judged": "u"}
 _OUTCOME: dict[Outcome | None, str] = {
@@ -62,7 +95,7 @@ def key_of(result: EntryResult) -> Key:
 
 def payload(
     suite: SuiteRun,
-    played: Mapping[Key, Playback],
+    played: Sequence[Motion],
     commands: Mapping[Key, str],
     *,
     searches: Sequence[WorseThan] = (),
@@ -76,13 +109,14 @@ def payload(
 
     Args:
         suite: the results.
-        played: playbacks of the worst failed rows.
+        played: the worst failed rows; of two egos what changes, too.
         commands: that show failures again.
         searches: for where the second of two egos is worse.
         maps: see `bridgegen.jobs.suite.maps.picture_payload`.
         code: characters that the page has besides its data.
     """
-    labels = [label_of(suite, ego) for ego in suite.egos]
+    labels = list(suite.labels)
+    found = suite_difference(suite)
     by_entry: dict[str, dict[str, EntryResult]] = {}
     for result in suite.results:
         by_entry.setdefault(result.entry, {})[result.ego] = result
@@ -110,7 +144,8 @@ def payload(
                 for ego in suite.egos
             ],
             "differences": differences([group for group in complete if len(group) > 1], labels),
-            "changes": _changes(suite, labels),
+            "changes": changes(found) if found else "",
+            "changed": _changed(suite, found, list(by_entry), at) if found else None,
             "facts": _facts(suite),
             "entries": entries,
             "criteria": _matrix(suite, criteria),
@@ -126,14 +161,52 @@ def payload(
     return page
 
 
-def _changes(suite: SuiteRun, labels: Sequence[str]) -> str:
-    """Return what the second of two egos breaks and fixes, in words; "" of any other number."""
-    if len(suite.egos) != 2:
-        return ""
-    first, second = (suite.of_ego(ego) for ego in suite.egos)
-    if [result.entry for result in first] != [result.entry for result in second]:  # it was stopped
-        return ""
-    return changes(variations_compared(first, second, (labels[0], labels[1])))
+def _changed(
+    suite: SuiteRun, found: Difference, entries: Sequence[str], at: Mapping[Played, int]
+) -> dict[str, Any]:
+    """Return the variations that change from the first ego to the second, and those that do not."""
+    order = in_order(found)
+    shown = [row for row in order if row.run][:MOST_CHANGES]
+    results = [{one.entry: one for one in suite.of_ego(ego)} for ego in suite.egos]
+    words = _Words()
+    of = []
+    for by_name in results:
+        rows = [by_name[row.entry].rows[row.row] for row in shown]
+        verdicts = {name: one.verdicts for name, one in by_name.items()}
+        of.append(
+            {
+                "v": "".join(_LETTER[verdicts[row.entry][row.row]] for row in shown),
+                "severity": [_short(row.severity) for row in rows],
+                "what": words.at(_happens(row) for row in rows),
+            }
+        )
+    motions = [at.get((row.entry, suite.egos[1], row.row), -1) for row in shown]
+    silent = Counter(
+        row.kind
+        for row in order
+        if row.kind in KINDS[:4] and (row.entry, suite.egos[1], row.row) not in at
+    )
+    table = {
+        "entry": [entries.index(row.entry) for row in shown],
+        "row": [row.row for row in shown],
+        "kind": [KINDS.index(row.kind) for row in shown],
+        "of": of,
+        "motion": motions,
+        "words": list(words.number),
+    }
+    return {
+        "headline": found.headline,
+        "kinds": list(found.kinds.items()),
+        "silent": list(silent.items()),
+        "unlisted": len(order) - len(shown),
+        "rows": _packed(table),
+    }
+
+
+def _happens(row: RowResult) -> str:
+    """Return the conflict of a variation that counts, its type, and with whom, a line each."""
+    some = (row.conflict, row.conflict_type, row.partner)
+    return "\n".join(some) if row.conflict in _HAPPENED else ""
 
 
 def _verdicts(suite: SuiteRun, of_it: Mapping[str, EntryResult]) -> list[Verdict]:
@@ -149,7 +222,7 @@ def _entry(
     of_it: Mapping[str, EntryResult],
     labels: Sequence[str],
     criteria: Mapping[str, int],
-    at: Mapping[Key, int],
+    at: Mapping[Played, int],
 ) -> dict[str, Any]:
     """Return a line of the table."""
     verdicts = _verdicts(suite, of_it)
@@ -159,7 +232,9 @@ def _entry(
         "title": next((result.title for result in of_it.values() if result.title), ""),
         "differ": difference(verdicts, labels) if whole else "",
         "results": [
-            _result(suite, of_it[ego], criteria, at.get((name, ego))) if ego in of_it else None
+            _result(suite, of_it[ego], criteria, at.get((name, ego, of_it[ego].worst or 0)))
+            if ego in of_it
+            else None
             for ego in suite.egos
         ],
     }
@@ -295,9 +370,9 @@ def _facts(suite: SuiteRun) -> list[str]:
         facts += [f"{name.replace('_', ' ')}: {s[name]}"] if s.get(name) else []
     facts += [f"ideal {', '.join(map(str, s['ideal']))}"] if s.get("ideal") else []
     facts += [f"seed {s['seed']}"] if s.get("seed") else []
-    for ego in suite.egos:
+    for ego, label in zip(suite.egos, suite.labels, strict=True):
         if sentence := suite.known_failures.sentence(suite.of_ego(ego)):
-            facts.append(f"{label_of(suite, ego)}: {sentence}" if len(suite.egos) > 1 else sentence)
+            facts.append(f"{label}: {sentence}" if len(suite.egos) > 1 else sentence)
     return facts
 
 
@@ -429,26 +504,35 @@ def _short(value: float | str | None) -> float | str | None:
 # ---- playbacks ----
 
 
-def _motions(played: Mapping[Key, Playback]) -> tuple[dict[str, Any], dict[Key, int]]:
+def _motions(played: Sequence[Motion]) -> tuple[dict[str, Any], dict[Played, int]]:
     """Return the playbacks, deflated, with their roads, each road once; and which is whose."""
     roads: list[str] = []
     number: dict[Any, int] = {}
     names, on, texts = list[str](), list[int](), list[str]()
-    at: dict[Key, int] = {}
+    at: dict[Played, int] = {}
     room = MOTIONS
-    for key, playback in played.items():
+    for motion in played:
+        playback, twin = motion.playback, motion.twin
         road = road_key(playback)
         new = "" if road in number else _packed(road_payload(playback))
-        whole = playback_payload(playback, 0, None)
-        text = _packed({name: value for name, value in whole.items() if name not in OF_ROW})
+        whole = _plain(playback)
+        if twin is not None:
+            # Of one row in one storyboard: bodies, road and clock are the same.
+            whole |= {"twin": _plain(twin), "diverged": diverged_at(twin, playback)}
+        text = _packed(whole)
         if len(new) + len(text) > room:
             continue
         room -= len(new) + len(text)
         if road not in number:
             number[road] = len(roads)
             roads.append(new)
-        at[key] = len(texts)
+        at |= {(motion.entry, ego, motion.row): len(texts) for ego in motion.egos}
         names.append(playback.name)
         on.append(number[road])
         texts.append(text)
     return {"names": names, "roads": roads, "on": on, "texts": texts}, at
+
+
+def _plain(playback: Playback) -> dict[str, Any]:
+    whole = playback_payload(playback, 0, None)
+    return {name: value for name, value in whole.items() if name not in OF_ROW}

@@ -38,6 +38,7 @@ class _Settings(Strict):
     time_limit: float | None
     matrix: str | None = None
     vehicle: str | None = None
+    driver_name: str | None = None
     version: str
 
 
@@ -183,6 +184,7 @@ def job_of(suite: SuiteRun, result: EntryResult, simulator: SimulatorChoice | No
         critical=settings.critical,
         objective=settings.objective,
         count=settings.count,
+        driver_name=settings.driver_name,
         ideal=settings.ideal,
         vehicle=settings.vehicle,
         others=settings.others,

@@ -16,7 +16,6 @@ from bridgegen.jobs.suite.results import (
     Verdict,
     counts,
 )
-from bridgegen.jobs.suite.suite import SuiteRun
 
 # --- Points of a matrix's rows by the colours of Euro NCAP's protocol of 2026 ---
 # Source: Euro NCAP, Crash Avoidance protocol, Frontal Collisions, 1.1 (2025), sections 4.2.4, 5.2
@@ -145,14 +144,6 @@ _WORD: dict[Verdict, str] = {
 }
 
 
-def label_of(suite: SuiteRun, ego: str) -> str:
-    """Return how an ego is called; of the scenarios' own drivers, the one that all have."""
-    if ego:
-        return ego
-    drivers = {result.driver for result in suite.of_ego(ego) if result.driver}
-    return drivers.pop() if len(drivers) == 1 else "the scenarios' own drivers"
-
-
 def headline(results: Sequence[EntryResult], label: str) -> str:
     """Return what an ego passes of its entries, as a sentence without an end.
 
@@ -274,7 +265,7 @@ def _of_many(word: str, number: int) -> str:
 
 
 def changes(found: Difference) -> str:
-    """Return what the second ego breaks and fixes of the variations, with intervals."""
+    """Return what the second ego breaks and fixes with intervals; "" where there are none."""
     counts = found.counts
     n = len(found.rows) - counts["not comparable"]
     if not n:
@@ -283,9 +274,8 @@ def changes(found: Difference) -> str:
     words = []
     for change, verb in verbs.items():
         low, high = found.interval(change)
-        sure = f" ({percent(low)} to {percent(high)})" if found.sampled else ""
-        words.append(f"{verb} {counts[change]:,}{sure}")
-    text = f"Of {n:,} variations, {found.second} {' and '.join(words)} against {found.first}"
+        words.append(f"{verb} {counts[change]:,} ({percent(low)} to {percent(high)})")
     if not found.sampled:
-        return f"{text}."
+        return ""
+    text = f"Of {n:,} variations, {found.second} {' and '.join(words)} against {found.first}"
     return f"{text} (95 % confidence; McNemar’s exact test: p = {found.p_value:.2g})."

@@ -74,7 +74,7 @@ def suite_shown(suite: SuiteRun) -> list[str | Table]:
     failed = [name for name in by_entry if name not in passed]
     left = max(0, MOST_ROWS - len(failed))
     listed = {*failed[:MOST_ROWS], *passed[:left]}
-    egos = [ego or "ego's own driver" for ego in suite.egos]
+    egos = list(suite.labels)
     rows = [
         (name, *(_verdict(suite, result) for result in some), _worst(some))
         for name, some in by_entry.items()
@@ -90,21 +90,22 @@ def suite_shown(suite: SuiteRun) -> list[str | Table]:
             for pair in zip(*by_ego, strict=True)
         ]
         found += ["", Table(("clause", *egos, "requirement"), clauses)]
-    found += ["", *(line for ego in suite.egos for line in _totals(suite, ego))]
+    by_label = zip(suite.egos, suite.labels, strict=True)
+    found += ["", *(line for ego, label in by_label for line in _totals(suite, ego, label))]
     if gone := suite.known_failures.gone(suite.results):
         found.append(f"no longer fail, set their status to fixed: {', '.join(gone)}")
     found += [f"map         {map_.page}" for map_ in suite.maps]
     return [*found, f"page        {suite.page}"]
 
 
-def _totals(suite: SuiteRun, ego: str) -> Iterator[str]:
+def _totals(suite: SuiteRun, ego: str, label: str) -> Iterator[str]:
     """Yield what an ego makes of the suite, and how its failures stand where indexes name some."""
     results = suite.of_ego(ego)
     number = counts(results)
     entries = sum(result.verdict == "passed" for result in results)
     unjudged = sum(result.verdict == "not judged" for result in results)
     yield (
-        f"{ego or 'the own drivers'}: {entries} of {len(results)} scenarios pass"
+        f"{label}: {entries} of {len(results)} scenarios pass"
         + (f", {unjudged} {'is' if unjudged == 1 else 'are'} not judged" if unjudged else "")
         + f"; of their variations {number['passed']} pass, {number['failed']} fail, "
         + (f"{number['not judged']} not judged, " if number["not judged"] else "")
@@ -169,6 +170,8 @@ def json_of_difference(found: DriverDifference) -> dict[str, Any]:
     return {
         "first": made.first,
         "second": made.second,
+        "headline": made.headline,
+        "kinds": made.kinds,
         "counts": made.counts,
         "p_value": made.p_value,
         "unjudged": made.unjudged,
@@ -190,11 +193,9 @@ def difference_shown(found: DriverDifference) -> list[str | Table]:
         for name, of_it in by_entry.items()
         if of_it["broken"] or of_it["fixed"] or of_it["not comparable"]
     ]
-    lines: list[str | Table] = []
+    lines: list[str | Table] = [made.headline, ""]
     if changed:
         lines += [Table(("scenario", *number), changed[:MOST_ROWS]), ""]
-    n = len(made.rows) - number["not comparable"]
-    lines.append(f"{made.second} against {made.first}, {n} variations")
     for change in ("broken", "fixed"):
         low, high = made.interval(change)
         sure = f" ({percent(low)} to {percent(high)} with 95 % confidence)" if made.sampled else ""

@@ -16,6 +16,7 @@ from bridgegen import drivers as egos
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, Interrupted, StorageError
 from bridgegen.base.records import parse_json
+from bridgegen.drivers.identity import checked_name, identity_of, labels_of
 from bridgegen.engine.options import called_with, range_problems
 from bridgegen.engine.workers.processes import cores
 from bridgegen.engine.workers.tasks import TaskPool
@@ -71,6 +72,21 @@ class SuiteRun:
             FileFormatError: an index is damaged.
         """
         return KnownFailures.of(self.results)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """How each ego is called; of the scenarios' own drivers, the one that all have."""
+        found = []
+        for ego in self.egos:
+            results = self.of_ego(ego)
+            own = {result.driver for result in results if result.driver}
+            shared = own.pop() if len(own) == 1 else "the scenarios' own drivers"
+            digest = next((one.driver_digest for one in results if one.driver_digest), "")
+            name = str(self.settings.get("driver_name") or "")
+            found.append(identity_of(ego or shared, digest, name))
+        labels = tuple(labels_of(found))
+        # Files of one content in two folders, whose weights beside them may differ.
+        return labels if len(set(labels)) == len(labels) else self.egos
 
     @property
     def work(self) -> str:
@@ -151,10 +167,11 @@ def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
     files = [given.files] if isinstance(given.files, str | Path) else list(given.files)
     simulator = given.simulator if isinstance(given, SuiteOptions) else EMBEDDED
     _check(given, simulator)
+    name = given.of_each.driver_name
     entries = of_edition(find_entries(files), given.matrix)
     drivers = tuple(dict.fromkeys(given.egos)) or ("",)
     folder = Path(given.out) if given.out is not None else _folder(files)
-    settings = _settings(given, simulator)
+    settings = _settings(given, simulator) | ({"driver_name": name} if name else {})
     jobs = [
         Job(
             entry,
@@ -214,6 +231,10 @@ def _check(given: ScenariosOptions, simulator: SimulatorChoice) -> None:
                 f"the vehicle '{given.vehicle}' is of the embedded simulator; {simulator.name} "
                 f"moves the ego in its own way (--vehicle {vehicles.KINEMATIC})"
             )
+    if given.of_each.driver_name is not None:
+        checked_name(given.of_each.driver_name)
+        if len(given.egos) != 1:
+            problems.append(f"--name names one driver (--ego), got {len(given.egos)}")
     if problems:
         raise InputError(*problems)
 

@@ -140,7 +140,7 @@ def read_line(
         changed,
         size,
         scenario=settings.scenario,
-        ego=settings.ego,
+        ego=settings.called,
         algorithm=settings.algorithm,
         seed=settings.seed,
         evaluations=n,

@@ -13,20 +13,26 @@ const INSTANTS = { contact: "collision", "near miss": "least time to collision",
 const WITH_DECISION = ["contact", "near miss", "violation"];
 export const ZONED = ["contact", "near miss"];
 
-export function fillConflict(kept) {
+export function fillConflict(kept, twin = null) {
   const found = kept.conflict, words = $("conflict");
-  words.hidden = !found;
+  words.hidden = !found && !twin;
   $("to-decided").hidden = !found || !WITH_DECISION.includes(found.conflict);
   $("ticks").replaceChildren();
-  if (!found) return;
-  const judged = data.triage?.judged?.[kept.evaluation]; // by its neighbours: in place of the end on braking
-  words.replaceChildren(judged ? `${found.bare}; ${judged}.` : found.sentence);
-  const last = Math.max(1, kept.n_steps - 1);
+  const last = Math.max(1, kept.n_steps - 1, (twin?.n_steps ?? 0) - 1);
   const tick = (k, name, kind) => {
     const mark = element("i", { class: kind, title: `${name} at ${(k * kept.time_step).toFixed(2)} s` });
     mark.style.left = `${(100 * k) / last}%`;
     $("ticks").append(mark);
   };
+  if (twin) {
+    const said = (one) => element("span", {}, element("strong", {}, `${one.driver}: `), one.conflict?.sentence ?? "no conflict.");
+    words.replaceChildren(said(twin), said(kept));
+    if (twin.conflict) tick(twin.conflict.instant, `${twin.driver}: ${INSTANTS[twin.conflict.conflict]}`, "instant");
+    if ((kept.diverged ?? null) !== null) tick(kept.diverged, "the drivers diverge", "diverged");
+  }
+  if (!found) return;
+  const judged = data.triage?.judged?.[kept.evaluation]; // by its neighbours: in place of the end on braking
+  if (!twin) words.replaceChildren(judged ? `${found.bare}; ${judged}.` : found.sentence);
   if (WITH_DECISION.includes(found.conflict)) tick(found.decided, "decided", "decided");
   tick(found.instant, INSTANTS[found.conflict], "instant");
 }

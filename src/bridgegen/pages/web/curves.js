@@ -28,23 +28,26 @@ export class Curves {
     canvas.addEventListener("pointermove", (event) => { if (event.buttons) to(event); });
   }
 
-  show(kept) {
+  // `twin`: the same with another driver, of which the ego's lines stand beside, in dots.
+  show(kept, twin = null) {
     this.kept = kept;
+    this.steps = Math.max(kept.n_steps, twin?.n_steps ?? 0);
     this.still = null;
-    this.strip = new Strip(kept);
+    this.strip = new Strip(kept, this.steps);
     this.canvas.style.setProperty("--strip", `${this.strip.height}px`);
     const players = playersOf(kept), { critical_distance: critical, hard_braking: hard } = data.summary;
     const line = (values, e = null) => ({
       values, colour: () => (e === null ? palette.ink : colourOf(kept, e)), dashes: e === null ? [] : DASHES[players.indexOf(e) % DASHES.length],
       name: e === null ? "" : kept.entities[e].name,
     });
+    const beside = (values, e = null) => (twin ? [{ values, colour: () => (e === null ? palette.muted : colourOf(kept, e)), dashes: [2, 3], name: twin.driver }] : []);
     const gaps = present(kept.distance), least = Math.min(...gaps, Infinity), speeds = Float64Array.from(present(players.flatMap((e) => kept.v[e]))).sort();
     /** @type {any[]} */
     const panels = [{
-      title: "distance", unit: "m", lines: [line(kept.distance)], low: 0, high: least < 8 ? Math.min(Math.max(1, ...gaps) * 1.05, FAR) : Math.max(1, ...gaps) * 1.05,
+      title: "distance", unit: "m", lines: [line(kept.distance), ...beside(twin?.distance)], low: 0, high: least < 8 ? Math.min(Math.max(1, ...gaps) * 1.05, FAR) : Math.max(1, ...gaps) * 1.05,
       mark: critical === null ? null : [critical, `critical below ${number(critical, 3)} m`],
     }, {
-      title: "speed", unit: "m/s", lines: players.map((e) => line(kept.v[e], e)), low: 0, high: Math.max(1, speeds.length ? unruled(speeds)[1] : 0) * 1.15, peaks: true,
+      title: "speed", unit: "m/s", lines: [...players.map((e) => line(kept.v[e], e)), ...beside(twin?.v[0], 0)], low: 0, high: Math.max(1, speeds.length ? unruled(speeds)[1] : 0) * 1.15, peaks: true,
     }];
     if (kept.ttc) {
       const finite = present(kept.ttc);
@@ -57,7 +60,7 @@ export class Curves {
       const all = present(players.flatMap((e) => kept.a[e].slice(0, -1))).filter((value) => Math.abs(value) <= HARDEST);
       const low = Math.min(-1, ...all) * 1.1, high = Math.max(1, ...all) * 1.1;
       panels.push({
-        title: "acceleration", unit: "m/s²", lines: players.map((e) => line(kept.a[e], e)), low, high, steps: true, peaks: true,
+        title: "acceleration", unit: "m/s²", lines: [...players.map((e) => line(kept.a[e], e)), ...beside(twin?.a?.[0] ?? [], 0)], low, high, steps: true, peaks: true,
         mark: low < -hard ? [-hard, `hard braking below −${hard} m/s²`] : null,
       });
     }
@@ -91,7 +94,7 @@ export class Curves {
     const outside = (panel) => Math.max(0, panel.left - x, x - panel.right) + Math.max(0, panel.top - y, y - panel.bottom);
     const all = this.strip.height ? [this.strip, ...this.panels] : this.panels;
     const { left, right } = all.reduce((best, panel) => (outside(panel) < outside(best) ? panel : best));
-    const last = this.kept.n_steps - 1;
+    const last = this.steps - 1;
     return Math.min(last, Math.max(0, Math.round(((x - left) / (right - left)) * last)));
   }
 
@@ -99,7 +102,7 @@ export class Curves {
   pixelOf(panel, index) {
     this.place();
     const { left, right, top, bottom } = this.panels[panel];
-    return [left + ((right - left) * index) / Math.max(1, this.kept.n_steps - 1), (top + bottom) / 2];
+    return [left + ((right - left) * index) / Math.max(1, this.steps - 1), (top + bottom) / 2];
   }
 
   // What stays is drawn once and kept; at each instant only the cursor and the values are new.
@@ -150,7 +153,7 @@ export class Curves {
    * @param {any} panel
    */
   scales({ left, right, top, bottom, low, high }) {
-    const last = Math.max(1, this.kept.n_steps - 1);
+    const last = Math.max(1, this.steps - 1);
     return {
       x: (k) => left + ((right - left) * k) / last,
       y: (value) => bottom - ((bottom - top) * (value - low)) / (high - low),
@@ -158,7 +161,7 @@ export class Curves {
   }
 
   drawAxes(c, panel, x, y) {
-    const { left, right, bottom, low, high } = panel, duration = (this.kept.n_steps - 1) * this.kept.time_step;
+    const { left, right, bottom, low, high } = panel, duration = (this.steps - 1) * this.kept.time_step;
     c.strokeStyle = palette.grid;
     c.fillStyle = palette.muted;
     c.lineWidth = 1;

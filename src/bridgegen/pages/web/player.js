@@ -19,6 +19,8 @@ const PAUSE_ICON = "M3 2h4v12H3zM9 2h4v12H9z";
 /** @type {["zoom-fit" | "zoom-all" | "follow" | "chase", "conflict" | "all" | "ego" | "chase"][]} */
 const FRAMINGS = [["zoom-fit", "conflict"], ["zoom-all", "all"], ["follow", "ego"], ["chase", "chase"]];
 
+const clockWords = ({ time, distance }) => `${time.toFixed(2)}\u00a0s  ·  distance\u00a0${distance === null ? "–" : `${distance.toFixed(2)}\u00a0m`}`;
+
 export class Player {
   constructor(hook) {
     this.hook = hook;
@@ -26,6 +28,8 @@ export class Player {
     this.describedAt = 0; // [ms], of the last description
     this.position = 0; // in steps; whole on a recorded instant
     this.scene = new Scene($("scene"), () => this.redraw());
+    this.scenes = [this.scene]; // of two drivers, that of the first, too
+    this.twinScene = null;
     this.curves = new Curves($("curves"), (k) => this.seek(k));
     new Save(this);
     this.connect();
@@ -36,7 +40,12 @@ export class Player {
   }
 
   get last() {
-    return this.kept.n_steps - 1;
+    return Math.max(this.kept.n_steps, this.twin?.n_steps ?? 0) - 1;
+  }
+
+  // The contacts of the playback; of two drivers those of the second, else of the first.
+  get contacts() {
+    return this.kept.contacts.length ? this.kept.contacts : this.twin?.contacts ?? [];
   }
 
   // Shows a scenario at its decisive instant, the moment that tells most; a click plays it from the start.
@@ -44,15 +53,10 @@ export class Player {
     this.pause();
     this.kept = unpack(kept);
     this.chosen = data.kept.indexOf(kept); // −1 of one that was not exported
-    $("scrub").max = this.last;
     $("scene-name").textContent = `${this.kept.name}`;
-    $("to-contact").hidden = !this.kept.contacts.length;
-    $("to-closest").hidden = this.kept.closest === null || this.kept.contacts.includes(this.kept.closest);
-    this.scene.show(this.kept);
-    this.curves.show(this.kept);
-    this.showLegend();
-    fillConflict(this.kept);
-    this.seek(this.kept.conflict?.instant ?? this.kept.closest ?? 0, false);
+    this.pair(kept.twin);
+    this.fill();
+    this.seek(this.kept.diverged ?? this.kept.conflict?.instant ?? this.kept.closest ?? 0, false);
     if (!andPlay) return;
     if ($("player").getBoundingClientRect().bottom > innerHeight) {
       $("player").scrollIntoView({ block: "nearest", behavior: CALM.matches ? "auto" : "smooth" });
@@ -65,14 +69,52 @@ export class Player {
   swap(kept) {
     this.pause();
     this.kept = kept;
-    $("scrub").max = this.last;
-    $("to-contact").hidden = !kept.contacts.length;
-    $("to-closest").hidden = kept.closest === null || kept.contacts.includes(kept.closest);
-    this.scene.show(kept);
-    this.curves.show(kept);
-    this.showLegend();
-    fillConflict(kept);
+    this.fill();
     this.seek(this.position, false);
+  }
+
+  fill() {
+    const { kept } = this;
+    $("scrub").max = this.last;
+    $("to-contact").hidden = !this.contacts.length;
+    $("to-closest").hidden = kept.closest === null || kept.contacts.includes(kept.closest);
+    $("to-diverged").hidden = (kept.diverged ?? null) === null;
+    this.scene.show(kept);
+    if (this.twinScene) this.showTwin();
+    this.curves.show(kept, this.twin);
+    this.showLegend();
+    fillConflict(kept, this.twin);
+  }
+
+  // Both scenes keep the same partner in sight.
+  showTwin() {
+    const { kept, twin } = this, partner = [kept, twin].map((one) => one.conflict?.partner_number ?? 0).find((e) => e > 0);
+    this.twinScene.show(twin);
+    if (!partner) return;
+    for (const { camera } of this.scenes) {
+      camera.partner = partner;
+      if (camera.view.framing !== "chase") camera.frame("conflict");
+    }
+  }
+
+  // The same scenario with another driver, in step: its scene stands before that of this one.
+  pair(packed) {
+    this.twin = packed ? unpack(packed) : null;
+    $("player").classList.toggle("paired", Boolean(packed));
+    $("twin").hidden = $("twin-now").hidden = !packed;
+    if (!packed) {
+      this.scenes = [this.scene];
+      this.twinScene = null;
+      return;
+    }
+    this.otherScene ??= new Scene($("twin-scene"), () => this.redraw());
+    this.twinScene = this.otherScene;
+    this.twinScene.layers = this.scene.layers;
+    // The same bodies have the same colours in both.
+    this.kept.players = this.twin.players = [...new Set([...playersOf(this.kept), ...playersOf(this.twin)])];
+    this.scenes = [this.twinScene, this.scene];
+    $("twin-name").textContent = this.twin.driver;
+    $("scene-name").textContent = this.kept.driver;
   }
 
   // Plays from the start, unless the reader wants no motion.
@@ -188,7 +230,8 @@ export class Player {
     const state = stateAt(this.kept, this.position);
     this.scene.draw(state);
     this.curves.draw(state);
-    $("clock").textContent = `${state.time.toFixed(2)}\u00a0s  ·  distance\u00a0${state.distance === null ? "–" : `${state.distance.toFixed(2)}\u00a0m`}`;
+    $("clock").textContent = clockWords(state);
+    this.redrawTwin();
     for (const [id, framing] of FRAMINGS) $(id).setAttribute("aria-pressed", this.scene.view.framing === framing);
     this.drawFlag(state);
     $("scrub").value = Math.round(this.position);
@@ -200,15 +243,23 @@ export class Player {
       scale: this.scene.view.scale, labels: this.scene.labels.boxes, crosses: this.scene.crosses,
       lights: this.kept.lamps.map((lamp) => lightAt(lamp, state.index)),
       detections: state.entities.map((_, e) => (e > 0 ? detectionAt(this.kept, e, state.index) : null)),
-      intention: intentionAt(this.kept, state), planned: plannedAt(this.kept, state), weather, elsewhere: this.scene.layers.elsewhere ? ghostsAt(this.kept, state) : [],
+      diverged: this.twin ? this.kept.diverged : null, twin: this.twin && stateAt(this.twin, this.position), intention: intentionAt(this.kept, state), planned: plannedAt(this.kept, state), weather, elsewhere: this.scene.layers.elsewhere ? ghostsAt(this.kept, state) : [],
     };
+  }
+
+  redrawTwin() {
+    if (!this.twinScene) return;
+    const state = stateAt(this.twin, this.position);
+    this.twinScene.draw(state);
+    $("twin-clock").textContent = clockWords(state);
+    if (!this.playing) $("twin-now").textContent = `${this.twin.driver}: ${stateWords(this.twin, state)}`;
   }
 
   // In words; while it plays, as often as one can read.
   describe(state, weather) {
     if (this.playing && performance.now() - this.describedAt < 250) return;
     this.describedAt = performance.now();
-    const now = stateWords(this.kept, state);
+    const now = `${this.twin ? `${this.kept.driver}: ` : ""}${stateWords(this.kept, state)}`;
     $("now").textContent = now;
     $("scrub").setAttribute("aria-valuetext", now);
     $("weather").hidden = !weather;
@@ -218,8 +269,9 @@ export class Player {
   drawFlag(state) {
     const flag = $("flag");
     const contact = this.kept.contacts.some((k) => state.index >= k && state.index < k + 1 / this.kept.time_step);
+    const diverges = this.twin && state.index === this.kept.diverged;
     const found = ZONED.includes(this.kept.conflict?.conflict) ? this.kept.conflict : null;
-    const label = contact ? "collision" : state.index === found?.instant ? "least time to collision" : state.index === found?.decided ? "decided here" : state.index === this.kept.closest ? "minimum distance" : "";
+    const label = contact ? "collision" : diverges ? "drivers diverge here" : state.index === found?.instant ? "least time to collision" : state.index === found?.decided ? "decided here" : state.index === this.kept.closest ? "minimum distance" : "";
     flag.hidden = !label;
     flag.className = contact ? "" : "near";
     flag.textContent = label;
@@ -230,17 +282,18 @@ export class Player {
     $("back").addEventListener("click", () => this.step(-1));
     $("forward").addEventListener("click", () => this.step(1));
     $("scrub").addEventListener("input", (event) => { this.pause(); this.seek(Number(event.target.value)); });
-    $("zoom-in").addEventListener("click", () => this.scene.view.zoom(1.4));
-    $("zoom-out").addEventListener("click", () => this.scene.view.zoom(1 / 1.4));
+    $("zoom-in").addEventListener("click", () => this.zoom(1.4));
+    $("zoom-out").addEventListener("click", () => this.zoom(1 / 1.4));
     for (const [id, framing] of FRAMINGS) $(id).addEventListener("click", () => this.frame(framing));
     $("copy-link").addEventListener("click", () => this.copyLink());
     for (const item of $("legend").children) item.querySelector("button")?.addEventListener("click", () => this.toggleLayer(item.dataset.layer));
     $("to-closest").addEventListener("click", () => this.jump(this.kept.closest));
     $("to-decided").addEventListener("click", () => this.jump(this.kept.conflict.decided));
-    $("to-contact").addEventListener("click", () => this.jump(this.kept.contacts[0]));
+    $("to-contact").addEventListener("click", () => this.jump(this.contacts[0]));
+    $("to-diverged").addEventListener("click", () => this.jump(this.kept.diverged));
     document.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => {
-      this.scene.camera.again();
+      for (const scene of this.scenes) scene.camera.again();
       this.redraw();
     }).observe($("player"));
   }
@@ -256,8 +309,12 @@ export class Player {
   }
 
   frame(framing) {
-    this.scene.camera.frame(framing);
+    for (const scene of this.scenes) scene.camera.frame(framing);
     this.redraw();
+  }
+
+  zoom(factor) {
+    for (const scene of this.scenes) scene.view.zoom(factor);
   }
 
   // Keys act while the focus is in the player, or nowhere and the player is in sight.
@@ -273,9 +330,10 @@ export class Player {
       ",": () => this.step(-1), ".": () => this.step(1), s: () => this.toggleLayer("sensed"), p: () => this.toggleLayer("course"), w: () => this.toggleLayer("weather"),
       g: () => this.toggleLayer("elsewhere"),
       l: () => this.copyLink(), e: () => this.frame("ego"), a: () => this.frame("all"), Home: () => this.jump(0), End: () => this.jump(this.last), f: () => this.frame("conflict"), b: () => this.frame("chase"),
-      d: () => this.jump(this.kept.closest ?? 0), c: () => { if (this.kept.contacts.length) this.jump(this.kept.contacts[0]); },
+      d: () => this.jump(this.kept.closest ?? 0), c: () => { if (this.contacts.length) this.jump(this.contacts[0]); },
+      v: () => { if (!$("to-diverged").hidden) this.jump(this.kept.diverged); },
       t: () => { if (!$("to-decided").hidden) this.jump(this.kept.conflict.decided); },
-      "+": () => this.scene.view.zoom(1.4), "=": () => this.scene.view.zoom(1.4), "-": () => this.scene.view.zoom(1 / 1.4),
+      "+": () => this.zoom(1.4), "=": () => this.zoom(1.4), "-": () => this.zoom(1 / 1.4),
       "[": () => faster(-1), "]": () => faster(1),
     };
     const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];

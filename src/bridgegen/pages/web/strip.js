@@ -9,8 +9,9 @@ const HEAD = 24;
 const MOST_ROWS = 4;
 
 export class Strip {
-  constructor(kept) {
+  constructor(kept, steps) {
     this.kept = kept;
+    this.steps = steps; // of the axis; another driver's may last longer
     this.left = this.right = this.top = this.bottom = 0; // see place
     const named = kept.sensed ? playersOf(kept).filter((e) => e > 0).slice(0, MOST_ROWS) : [];
     this.rows = named.map((e) => ({ e, name: kept.entities[e].name, spells: this.spells(e) }));
@@ -37,7 +38,7 @@ export class Strip {
 
   draw(c) {
     if (!this.rows.length) return;
-    const { left, right, top, kept } = this, last = Math.max(1, kept.n_steps - 1);
+    const { left, right, top, kept } = this, last = Math.max(1, this.steps - 1);
     const x = (k) => left + ((right - left) * Math.min(k, last)) / last;
     this.drawKey(c);
     this.rows.forEach(({ e, name, spells }, i) => {

@@ -2,6 +2,7 @@
 
 import { $, element } from "./common.js";
 import { hook } from "./hook.js";
+import { changes } from "./suite_changes.js";
 import { showClauses } from "./suite_clauses.js";
 import { showCriteria } from "./suite_criteria.js";
 import { showSearches } from "./suite_searches.js";
@@ -16,9 +17,14 @@ function showResult() {
     const count = (v) => suite.entries.filter(({ results }) => results[e]?.v === v).length;
     $("result").append(element("p", { class: "headline" }, `${headline}.`), bar(["p", "f", "n", "u"].map(count)), ...suite.outcomes[e].map((text) => element("p", { class: "outcome" }, `${text}.`)));
   });
-  for (const text of [suite.differences]) {
+  for (const text of [suite.changes, suite.differences]) {
     if (text) $("result").append(element("p", { class: "differences" }, text));
   }
+}
+
+// What the page's address names is a change, or a scenario; of two drivers the first change opens by itself.
+async function go() {
+  if (!(await changes.go())) await table.go();
 }
 
 showResult();
@@ -27,7 +33,8 @@ showCriteria();
 showMaps();
 showSearches();
 table.fill();
-table.go();
+changes.fill().then(go);
+addEventListener("hashchange", go);
 hook.open = (name) => table.show(suite.entries.findIndex((one) => one.name === name));
 hook.shown = () => table.order.map((k) => suite.entries[k].name);
 document.addEventListener("theme", () => motions.player?.redraw());

@@ -1,7 +1,9 @@
 // The playbacks of a suite's worst failures: each is inflated when it is wanted, and so is its road.
 
 import { $ } from "./common.js";
+import { ZONED } from "./conflict.js";
 import { data } from "./data.js";
+import { glyph } from "./glyph.js";
 import { hook } from "./hook.js";
 import { inflated } from "./inflate.js";
 import { Player } from "./player.js";
@@ -14,6 +16,7 @@ const unpacked = async (text) => JSON.parse(new TextDecoder().decode(await infla
 class Motions {
   constructor() {
     this.wanted = -1;
+    this.owner = null;
     /** @type {Player | null} */
     this.player = null;
   }
@@ -32,8 +35,24 @@ class Motions {
     const on = packed.on[k], [kept, road] = await Promise.all([unpacked(packed.texts[k]), data.roads[on] ?? unpacked(packed.roads[on])]);
     data.roads[on] = road;
     kept.road = on;
+    if (kept.twin) {
+      Object.assign(kept, { driver: suite.egos[1] });
+      Object.assign(kept.twin, { driver: suite.egos[0], road: on });
+    }
     data.kept.push(kept); // the player's address is by name
     return kept;
+  }
+
+  // A picture of the contact or near miss of one, in an element, once it is read; of two drivers, the second's before the first's.
+  async picture(k, host) {
+    const kept = await this.get(k), shown = [kept, kept.twin].find((one) => ZONED.includes(one?.conflict?.conflict)), made = shown && glyph(shown);
+    if (made) host.replaceChildren(made);
+  }
+
+  // Who has the player closes where it was: there is one.
+  take(owner) {
+    if (this.owner && this.owner !== owner) this.owner.close();
+    this.owner = owner;
   }
 
   // Plays one inside an element.

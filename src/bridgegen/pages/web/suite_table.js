@@ -48,7 +48,9 @@ function verdictKey(result) {
 function scenarioCell(k) {
   const { title, differ } = entries[k];
   const open = button(entries[k].name, () => table.toggle(k), { "aria-expanded": "false", class: "open" });
-  return [open, title ? element("small", {}, title) : "", differ ? element("em", {}, differ) : ""];
+  const picture = element("span", { class: "picture" }), worst = told[k].worst ?? entries[k].results.find((one) => one && "motion" in one);
+  if (worst && "motion" in worst) motions.picture(worst.motion, picture);
+  return [picture, open, title ? element("small", {}, title) : "", differ ? element("em", {}, differ) : ""];
 }
 
 function resultCell(result) {
@@ -85,7 +87,6 @@ class Entries {
     this.heads = ENTRY_COLUMNS.map(([title, , , kind], i) => element("th", { scope: "col", class: kind }, button(title, () => this.sort(i, this.column === i && !this.down))));
     $("table").tHead.append(element("tr", {}, ...this.heads));
     new IntersectionObserver(([{ isIntersecting }]) => { if (isIntersecting) this.draw(); }, { rootMargin: "800px" }).observe($("more"));
-    addEventListener("hashchange", () => this.go());
     addEventListener("beforeprint", () => { while (this.drawn < this.order.length) this.draw(); });
   }
 
@@ -180,6 +181,7 @@ class Entries {
   }
 
   async show(k, ego, seconds) {
+    motions.take(this);
     this.close();
     const row = this.rowOf(k), host = element("td", { colspan: `${ENTRY_COLUMNS.length}` });
     this.open = k;
