@@ -306,7 +306,7 @@ def _course(replay: Replay, row: int) -> Course | None:
     number = np.full(max(ways) + 2, -1)  # -1 stays -1
     number[list(ways)] = range(len(ways))
     return Course(
-        ways=tuple(_thin(way) for way in ways.values()),
+        ways=tuple(thin(way) for way in ways.values()),
         steps=meant.steps,
         way=number[meant.way[row]],
         station=meant.station[row],
@@ -332,8 +332,8 @@ def _plans(replay: Replay, row: int) -> tuple[Planned, ...]:
     return tuple(found)
 
 
-def _thin(line: Float) -> Float:
-    """Return a line without the points that it does not need to stay within ``THIN`` of itself."""
+def thin(line: Float, tolerance: float = THIN) -> Float:
+    """Return a line ``(n, 2)`` without points it does not need to stay within a tolerance [m]."""
     kept = np.zeros(len(line), dtype=np.bool_)
     kept[[0, -1]] = True
     # Douglas and Peucker's simplification, with a stack in place of recursion, whose depth Python
@@ -352,7 +352,7 @@ def _thin(line: Float) -> Float:
             else np.hypot(*off.T)
         )
         worst = int(gap.argmax())
-        if gap[worst] > THIN:
+        if gap[worst] > tolerance:
             kept[first + 1 + worst] = True
             parts += [(first, first + 1 + worst), (first + 1 + worst, last)]
     return line[kept]

@@ -114,6 +114,7 @@ class Cell:
         code: a formula below the text.
         links: address, text and label of further links, below it.
         more: after these.
+        picture: above all of it, `Markup` of ours.
     """
 
     text: str
@@ -126,6 +127,7 @@ class Cell:
     code: str = ""
     links: Sequence[tuple[str, str, str]] = ()
     more: str = ""
+    picture: str = ""
 
 
 def shown(value: object) -> object:

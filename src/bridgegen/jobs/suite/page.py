@@ -22,6 +22,7 @@ from bridgegen.pages.payload import script_json
 from bridgegen.pages.playback import Playback
 from bridgegen.pages.playbacks import beside_others, measured_playbacks
 from bridgegen.pages.templates import Banner
+from bridgegen.pages.thumbnails import Thumbnail, thumbnail, write_thumbnails
 from bridgegen.simulation.choice import EMBEDDED
 
 FILE = "suite.html"
@@ -62,7 +63,20 @@ def write_suite_page(
         for result in suite.results
         if result.verdict == "failed" and key_of(result) in by_key
     }
-    return _write(suite, dict(_playbacks(suite, by_key)), commands, searches, maps)
+    played = dict(_playbacks(suite, by_key))
+    write_thumbnails(suite.folder, _thumbnails(suite, played))
+    return _write(suite, played, commands, searches, maps)
+
+
+def _thumbnails(suite: SuiteRun, played: Mapping[Key, Playback]) -> Iterator[Thumbnail | None]:
+    """Yield what other pages show of the entries that fail."""
+    for result in suite.results:
+        if key_of(result) in played and result.worst is not None:
+            row = result.rows[result.worst]
+            words = f"{result.entry}: {row.conflict_type or 'critical'}"
+            yield thumbnail(
+                played[key_of(result)], words, entry=result.entry, ego=result.ego or result.driver
+            )
 
 
 def write_replay_page(made: Replayed) -> Path:
