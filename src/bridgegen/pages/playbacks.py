@@ -195,15 +195,20 @@ def _beside(label: str, playback: Playback, rollout: Rollout, row: int) -> Besid
     return Beside(label, tuple(np.flatnonzero(apart).tolist()), *(motion[n][apart] for n in "xyh"))
 
 
-def nominal_playback(pipeline: Pipeline, name: str) -> Playback:
-    """Return the playback of a scenario with all parameters at their defaults.
+def nominal_playback(pipeline: Pipeline, name: str, x: Float | None = None) -> Playback:
+    """Return the playback of a scenario with all parameters at their defaults, or of a row.
 
     No objective is asked whether it is critical.
+
+    Args:
+        pipeline: of the scenario.
+        name: of the playback.
+        x: the row, ``(len(space.names),)``.
 
     Raises:
         FileFormatError: it has no result.
     """
-    X = pipeline.space.row({})[np.newaxis]
+    X = (pipeline.space.row({}) if x is None else x)[np.newaxis]
     # One row has one storyboard, hence one part.
     ((_, replay),) = pipeline.replays(X, plans=False).parts
     rollout = replay.rollout

@@ -182,12 +182,12 @@ def thumbnail(
     poses = np.stack([playback.x, playback.y, playback.h], axis=-1)[:, : playback.n_steps]
     there = np.asarray(np.isfinite(poses).all(axis=-1))  # (E, T)
     conflict, distance = playback.conflict, playback.distance[: playback.n_steps]
-    partner = conflict.partner if conflict is not None else 0
-    instant = (
-        conflict.instant
-        if conflict is not None
-        else int(np.nan_to_num(distance, nan=np.inf).argmin())
-    )
+    if conflict is not None:
+        partner, instant = conflict.partner, conflict.instant
+    else:  # the closest approach, and the one that is nearest then
+        instant = int(np.nan_to_num(distance, nan=np.inf).argmin())
+        far = np.hypot(*np.moveaxis(poses[:, instant, :2] - poses[0, instant, :2], -1, 0))
+        partner = int(np.nan_to_num(far[1:], nan=np.inf).argmin()) + 1 if len(far) > 1 else 0
     both = there[0] & there[partner]
     if instant >= len(both) or not both[instant]:
         return None
