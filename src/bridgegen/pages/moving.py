@@ -1,6 +1,7 @@
 """An event as a moving picture: SVG that needs no script."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from bridgegen.base.arrays import Bool, Float
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.pages.birdseye import ASPHALT, GROUND, INK, PLAYERS, Camera, View, centre_of
 from bridgegen.pages.charts import element
-from bridgegen.pages.playback import Entity
+from bridgegen.pages.playback import Entity, Outline
 from bridgegen.pages.scenery import bodies
 from bridgegen.pages.svg import SvgDraw
 from bridgegen.simulation.rollout import Rollout
@@ -31,6 +32,7 @@ def moving_picture(
     every: float = EVERY,
     most: int | None = None,
     follow: float | None = None,
+    road: Iterable[Outline] = (),
 ) -> Markup:
     """Return the picture of an event, seen from above, over and over.
 
@@ -43,9 +45,11 @@ def moving_picture(
         most: participants that are shown, the first ones; by default all.
         follow: metres from top to bottom of a view that follows the ego; by default the view holds
             the whole paths of both.
+        road: below all, of a view that does not follow.
     """
     # From left to right: the picture is wide.
-    motion = _turned(motion)
+    start, turn = np.array([motion.x[0, 0, 0], motion.y[0, 0, 0]]), _turn(motion)
+    motion = _turned(motion, start, turn)
     kinds = [NAMES[code] for code in motion.kinds.tolist()] or ["car"] * len(motion.names)
     entities = bodies(motion, dict(zip(motion.names, kinds, strict=True)))[:most]
     n = min(int(motion.n_steps[0]), motion.shape[2])
@@ -57,6 +61,7 @@ def moving_picture(
     if follow is not None:
         camera = Camera(0.0, 0.0, HEIGHT / follow, (WIDTH / 2, HEIGHT / 2))
     view = View(draw, camera, 1.2)
+    view.road(Outline(one.kind, (one.points - start) @ turn) for one in road)
     colours = {**dict.fromkeys(range(len(entities)), ASPHALT), other: PLAYERS[1], 0: PLAYERS[0]}
     moment = int(np.clip(round(when / motion.time_step), 0, n - 1))
     step = max(1, round(every / motion.time_step))
@@ -79,16 +84,20 @@ def moving_picture(
     return Markup(draw.svg(title=caption, is_file=False))
 
 
-def _turned(motion: Rollout) -> Rollout:
-    """Return the motion with the ego's way from left to right, from (0, 0) on."""
+def _turn(motion: Rollout) -> Float:
+    """Return the matrix ``(2, 2)`` that turns points so that the ego goes from left to right."""
     x, y = motion.x[0, 0], motion.y[0, 0]
     dx, dy = float(x[-1] - x[0]), float(y[-1] - y[0])
     angle = math.atan2(dy, dx) if math.hypot(dx, dy) > STANDS else float(motion.h[0, 0, 0])
     cosine, sine = math.cos(angle), math.sin(angle)
-    to_x, to_y = motion.x - x[0], motion.y - y[0]
-    return replace(
-        motion, x=to_x * cosine + to_y * sine, y=to_y * cosine - to_x * sine, h=motion.h - angle
-    )
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def _turned(motion: Rollout, start: Float, turn: Float) -> Rollout:
+    """Return the motion with the ego's way from left to right, from (0, 0) on."""
+    points = (np.stack([motion.x, motion.y], axis=-1) - start) @ turn
+    angle = math.atan2(turn[1, 0], turn[0, 0])
+    return replace(motion, x=points[..., 0], y=points[..., 1], h=motion.h - angle)
 
 
 def _camera(poses: Float) -> Camera:

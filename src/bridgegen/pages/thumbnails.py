@@ -35,6 +35,9 @@ BEFORE, AFTER, EVERY = 3.0, 1.0, 0.2
 MARGIN, LEAST, MOST = 5.0, 24.0, 44.0
 """Space about both bodies, and least and largest width of what is seen [m]."""
 
+LEAST_SCALE = 3.4
+"""Least scale [pixels per metre]: a small picture shows less, and not smaller bodies."""
+
 RING = 4.0
 """Radius of the ring where bodies touch [m]: both are seen in it."""
 
@@ -302,7 +305,8 @@ def drawn(shown: Thumbnail, id: str, size: tuple[int, int] = SIZE) -> Markup:
         size: width and height [pixels].
     """
     draw = SvgDraw(size, GROUND)
-    camera = Camera(0.0, 0.0, size[0] / shown.width, (size[0] / 2, size[1] / 2))
+    scale = max(size[0] / shown.width, LEAST_SCALE)
+    camera = Camera(0.0, 0.0, scale, (size[0] / 2, size[1] / 2))
     view = View(draw, camera, _UNIT * size[0] / SIZE[0])
     view.road(Outline(shape.kind, np.array(shape.points)) for shape in shown.road)
     # The two that meet lie over all others, the ego over both.

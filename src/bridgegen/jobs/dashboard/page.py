@@ -208,7 +208,8 @@ def _verdicts(found: Dashboard, base: str) -> dict[str, Any]:
     shown = [(row, head) for row in rows for head in heads if failures.get((row, head))]
     shown.sort(key=lambda key: -stands[key].modes[0].severity)
     kept = {key: _picture_of(found, stands[key]) for key in shown[:MOST_PICTURES]}
-    size = LARGE if len(rows) <= FEW else SMALL
+    is_small = len(rows) > FEW
+    size = SMALL if is_small else LARGE
     pictures = {
         key: drawn(picture, f"t{i}", size)
         for i, (key, picture) in enumerate(kept.items())
@@ -219,8 +220,11 @@ def _verdicts(found: Dashboard, base: str) -> dict[str, Any]:
         row: list[object] = [scenario]
         for driver in heads:
             standing = stands.get((scenario, driver), Standing("never tried"))
-            cell = _standing(standing, f"{driver} in {scenario}", base)
-            row.append(replace(cell, picture=pictures.get((scenario, driver), "")))
+            picture = pictures.get((scenario, driver), "")
+            # A small picture has its words where the pointer is: more scenarios are on one screen.
+            is_brief = is_small and bool(picture)
+            cell = _standing(standing, f"{driver} in {scenario}", base, is_brief=is_brief)
+            row.append(replace(cell, picture=picture))
         cells.append(row)
     left = [
         f"{counted(number, noun)} left out"
@@ -235,20 +239,19 @@ def _verdicts(found: Dashboard, base: str) -> dict[str, Any]:
     return {**table, "left": ", ".join(left), "pictures": len(pictures)}
 
 
-def _standing(standing: Standing, where: str, base: str) -> Cell:
-    words = standing.verdict
-    notes: list[str] = []
-    text: str = words
+def _standing(standing: Standing, where: str, base: str, *, is_brief: bool) -> Cell:
+    words, text, note = standing.verdict, str(standing.verdict), ""
     if standing.modes:
         text = f"FAILS, {counted(len(standing.modes), 'mode')}"
         severity = standing.modes[0].severity
         # In short: who is responsible, and why, is in the table of failure modes.
-        title = standing.modes[0].title.partition(" (")[0]
-        notes = [title + (f" · MAIS3+ {share(severity)}" if severity else "")]
+        title = "" if is_brief else standing.modes[0].title.partition(" (")[0]
+        note = " · ".join(filter(None, (title, f"MAIS3+ {share(severity)}" if severity else "")))
     worst = standing.worst
     href = _address(base, worst.page) if worst is not None else ""
     mark = _MARKS[words]
-    return Cell(text, notes, kind=mark[1], href=href, label=f"{where}: {text}", mark=mark)
+    label, notes = f"{where}: {text}", [note] if note else []
+    return Cell(text, notes, kind=mark[1], href=href, label=label, mark=mark)
 
 
 def _picture_of(found: Dashboard, standing: Standing) -> Thumbnail | None:
