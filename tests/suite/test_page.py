@@ -21,6 +21,7 @@ from bridgegen.jobs.suite.page_payload import payload
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.sentences import difference, differences, headline
 from bridgegen.jobs.suite.suite import SuiteRun, evaluate_suite
+from bridgegen.pages.thumbnails import read_thumbnails
 from bridgegen.results.failures import read_failures, write_failures
 
 CRITERIA = {"criteria": ["C-1: always(ego.v < 12 m/s)"]}
@@ -266,6 +267,12 @@ def test_the_page_plays_the_worst_failure_of_each(run):
         assert motion["evaluation"] == one.worst
         assert bool(motion["contacts"]) == bool(row.collisions)
         assert motions["names"][cells[one.entry, one.ego]["motion"]] == f"{one.entry} ({one.ego})"
+    # What a dashboard shows of them without simulating.
+    kept = {(shown.entry, shown.ego): shown for shown in read_thumbnails(run.folder)}
+    assert kept.keys() == {(one.entry, one.ego) for one in failed}
+    for one in failed:
+        touches = kept[one.entry, one.ego].contact is not None
+        assert touches == bool(one.rows[one.worst].collisions)
     assert path.read_bytes() == write_suite_page(run, run.jobs).read_bytes()
 
 
@@ -284,6 +291,7 @@ def test_no_playback_of_files_that_have_changed(run, folder):
         file.write_text(file.read_text("utf-8") + "<!-- changed -->", "utf-8")
     suite = data_of(write_suite_page(run, run.jobs).read_text("utf-8"))["suite"]
     assert suite["motions"]["texts"] == []
+    assert read_thumbnails(run.folder) == ()
     assert not any("motion" in one for entry in suite["entries"] for one in entry["results"])
 
 
