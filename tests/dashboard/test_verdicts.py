@@ -99,6 +99,27 @@ def test_what_is_left_out_is_said_and_what_fails_is_kept(project, result, tmp_pa
     assert "1 scenario left out" in text
 
 
+def test_versions_are_a_chart_and_a_large_project_a_page_of_bounded_size(project, result, tmp_path):
+    found = bg.build_dashboard(project, out=tmp_path / "a.html")
+    many = [
+        result(f"s{s}", f"1.{v}", v * DAY, name=f"stack{d}", modes=tuple("abcd"[: 4 - v]))
+        for d in range(20)
+        for s in range(20)
+        for v in range(5)
+    ]
+    modes = tuple(failure_modes(many, Decisions({})))
+    write_page(
+        replace(found, modes=modes, project=replace(found.project, runs=tuple(many), suites=()))
+    )
+    text = found.page.read_text("utf-8")
+    assert len(text) < 3_000_000
+    chart = re.search(r'aria-label="Failure modes of stack7 by version: (.*?)".*?</svg>', text)
+    assert chart[1].startswith("1.0 80 failure modes; 1.1 60 failure modes")
+    assert chart[1].endswith("1.4 0 failure modes")
+    assert "20 of 20 fail" in chart[0]
+    assert "0 of 20 fail" in chart[0]
+
+
 @pytest.mark.browser
 @pytest.mark.parametrize("width", [1440, 390])
 def test_a_large_matrix_moves_in_its_box_under_its_heads(width, project, result, browser, tmp_path):

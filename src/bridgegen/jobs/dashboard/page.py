@@ -24,9 +24,9 @@ from bridgegen.pages.templates import Banner, Cell, counted, joined, when
 from bridgegen.pages.thumbnails import Thumbnail, drawn, read_thumbnails
 from bridgegen.results.failures import FILE
 
-MOST_MODES = 500
+MOST_MODES = 300
 """Largest number of failure modes of a table; the others are counted."""
-MOST_RESULTS = 5
+MOST_RESULTS = 3
 """Largest number of results of a failure mode that are linked."""
 MOST_REQUIREMENTS, MOST_SCENARIOS = 40, 200
 """Largest numbers of columns and rows of a matrix; the gravest requirements."""
