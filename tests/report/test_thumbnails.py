@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
+from bridgegen.base.errors import StorageError
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.pages.playback import Playback
+from bridgegen.pages.playback import Outline, Playback
 from bridgegen.pages.playbacks import nominal_playback
 from bridgegen.pages.templates import style
 from bridgegen.pages.thumbnails import (
@@ -92,6 +94,21 @@ def test_none_removes_what_was_kept_before(shown, tmp_path):
     write_thumbnails(tmp_path, [None])
     assert read_thumbnails(tmp_path) == ()
     assert not (tmp_path / FILE).exists()
+
+
+def test_what_cannot_be_removed_is_one_error(tmp_path):
+    (tmp_path / FILE).mkdir()
+    with refuses(StorageError, FILE):
+        write_thumbnails(tmp_path, [])
+
+
+def test_long_roads_keep_their_direction_and_a_body_beyond_all_bounds_costs_the_picture(playback):
+    far = Outline("centre", np.array([[-9000.0, -4500.0], [9000.0, 4500.0]]))
+    found = thumbnail(replace(playback, lanes=(far,)), CAPTION)
+    ((x0, y0), (x1, y1)) = found.road[0].points
+    assert math.hypot(x1 - x0, y1 - y0) == pytest.approx(math.hypot(18000.0, 9000.0), abs=0.2)
+    long = replace(playback.entities[0], length=300.0)
+    assert thumbnail(replace(playback, entities=(long, *playback.entities[1:])), CAPTION) is None
 
 
 def test_captions_are_text(shown):

@@ -11,13 +11,13 @@ from typing import Annotated, Self
 
 import numpy as np
 from markupsafe import Markup
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from bridgegen.assess.conflict.analysis import CONTACT
 from bridgegen.assess.conflict.findings import KINDS
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.disk import write_whole
-from bridgegen.base.errors import BridgeGenError, FileFormatError
+from bridgegen.base.errors import BridgeGenError, FileFormatError, StorageError
 from bridgegen.base.records import read_model
 from bridgegen.pages.birdseye import GROUND, HIT, PLAYERS, Camera, View, centre_of
 from bridgegen.pages.charts import element
@@ -52,7 +52,10 @@ _DROPPED = frozenset({"edge", "route", "sign", "shoulder", "sidewalk"})
 
 _UNIT = 0.6  # pixels of a line that is one pixel wide in a picture of 960 pixels
 
-Metres = Annotated[float, Field(ge=-1e3, le=1e3, allow_inf_nan=False)]
+FARTHEST = 1e6
+"""Largest distance from the middle of the picture [m]."""
+
+Metres = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
 Text = Annotated[str, Field(max_length=500)]
 
 
@@ -142,7 +145,10 @@ def write_thumbnails(folder: Path, some: Iterable[Thumbnail | None]) -> None:
     found = [item for item in some if item is not None]
     found = [item for item in found if len(item.model_dump_json()) <= MOST_BYTES][:MOST_KEPT]
     if not found:
-        (folder / FILE).unlink(missing_ok=True)
+        try:
+            (folder / FILE).unlink(missing_ok=True)
+        except OSError as error:
+            raise StorageError(f"{folder / FILE}: cannot be removed: {error.strerror}") from None
         return
     text = _Thumbnails(thumbnails=tuple(found)).model_dump_json(exclude_defaults=True)
     write_whole(folder / FILE, [text.encode()])
@@ -176,12 +182,21 @@ def thumbnail(
 ) -> Thumbnail | None:
     """Return the thumbnail of a playback; None where the ego is not there at the decisive instant.
 
+    None, too, where a number is beyond the bounds (a body of 300 m): it would not be read again.
+
     Args:
         playback: of the scenario.
         caption: what it shows; may be cut.
         entry: of a suite.
         ego: of a suite.
     """
+    try:
+        return _thumbnail(playback, caption, entry, ego)
+    except ValidationError:
+        return None
+
+
+def _thumbnail(playback: Playback, caption: str, entry: str, ego: str) -> Thumbnail | None:
     poses = np.stack([playback.x, playback.y, playback.h], axis=-1)[:, : playback.n_steps]
     there = np.asarray(np.isfinite(poses).all(axis=-1))  # (E, T)
     conflict, distance = playback.conflict, playback.distance[: playback.n_steps]
@@ -214,7 +229,7 @@ def thumbnail(
     for e in [*pair, *others][:MOST_BODIES]:
         body = playback.entities[e]
         xy = (poses[e, at, :2] - middle) @ turn
-        turned = np.column_stack([np.clip(xy, -999.0, 999.0), np.unwrap(poses[e, at, 2] - h)])
+        turned = np.column_stack([xy, np.unwrap(poses[e, at, 2] - h)])
         box = (body.length, body.width, body.center_ahead)
         bodies.append(Body(type=body.type, box=box, poses=_rounded(turned, 2)))
     is_contact = (
@@ -276,8 +291,7 @@ def _road(lanes: Iterable[Outline], middle: Float, turn: Float, width: float) ->
         points += len(lane.points)
         if points > MOST_POINTS:
             break
-        clipped = np.clip(lane.points, -999.0, 999.0)
-        shapes.append(Shape(kind=lane.kind, points=_rounded(clipped, 1)))
+        shapes.append(Shape(kind=lane.kind, points=_rounded(lane.points, 1)))
     return tuple(shapes)
 
 
