@@ -17,6 +17,7 @@ from bridgegen.jobs.benchmark.failures import failures_of
 from bridgegen.jobs.benchmark.plan import Cell
 from bridgegen.jobs.compare.runs import RunsProgress
 from bridgegen.jobs.search.run import Run
+from bridgegen.pages.thumbnails import read_thumbnails
 from bridgegen.scenario.participants import PARTICIPANTS
 
 GRID = {
@@ -97,6 +98,11 @@ def test_each_failure_has_its_files_and_a_script(done):
             assert np.allclose(np.diff(seen["time"]), np.diff(seen["time"])[0])
             assert seen["length"] == PARTICIPANTS["car"].body.length
         assert (out / row["playback"].partition("#")[0]).is_file()
+    # The worst failure of the run plays in the table, beside the links to it.
+    page = done.page.read_text("utf-8")
+    (shown,) = read_thumbnails(out / "runs/cut-in-blind-perfect-0")
+    assert shown.caption in {row["mode"] for row in modes}
+    assert f"<title>{shown.caption}</title>" in page
 
 
 def test_every_link_of_the_page_leads_to_a_file(done):

@@ -11,6 +11,7 @@ from tests.pages import without_theme
 from bridgegen.jobs.preventability.classes import CellClass
 from bridgegen.jobs.preventability.grid import GridAxis
 from bridgegen.jobs.preventability.page import COLOURS, png
+from bridgegen.jobs.preventability.pictures import representatives
 from bridgegen.jobs.preventability.preventability import map_preventability
 
 
@@ -54,6 +55,42 @@ def test_the_page_shows_every_driver_upright_and_loads_nothing(tmp_path):
     np.testing.assert_array_equal(pixels, expected)
     for one in (CellClass.AVOIDED, CellClass.PREVENTABLE):
         assert f"{found.counts('route-follower')[one]:,}<small>" in page
+
+
+def test_cells_stand_in_the_middle_of_their_class_and_at_its_boundary():
+    codes = np.zeros((9, 9), np.int8)
+    codes[:, 5:] = CellClass.UNPREVENTABLE
+    codes[0, 8] = CellClass.NOT_APPLICABLE
+    found = {(kind, place): at for kind, place, at in representatives(codes)}
+    assert {kind for kind, _ in found} == {CellClass.AVOIDED, CellClass.UNPREVENTABLE}
+    for (kind, place), at in found.items():
+        assert codes[at] == kind
+        if place == "at the boundary":
+            assert at[1] in (4, 5)
+        else:
+            assert at[1] in (0, 8)  # the map's end is no boundary
+    assert [*representatives(np.full((3, 3), CellClass.NO_RESULT, np.int8))] == []
+
+
+def test_played_cells_do_what_their_class_says(tmp_path):
+    """A ring stands where bodies touch: in the cells that are not avoided, and in no other."""
+    found = map_preventability(
+        "r157/cut-in", ["route-follower", "computed:rss"],
+        grid={"gap": GridAxis(1.0, 61.0, 9), "relative_speed": GridAxis(3.0, 14.0, 5)},
+        out=tmp_path / "map",
+    )  # fmt: skip
+    page = found.page.read_text("utf-8")
+    figures = re.findall(r'<figure class="card" id="cell-(\d+)">(.*?)</figure>', page, re.DOTALL)
+    assert 4 <= len(figures) <= 6  # what is computed has no motion
+    for number, text in figures:
+        assert page.count(f'href="#cell-{number}"') == 1
+        label = re.search(r"<strong>\d+ · (.*?), ", text)[1]
+        assert ('stroke="#c00020"' in text) == (label != CellClass.AVOIDED.label)
+    counts = found.counts("route-follower")
+    hits = counts[CellClass.PREVENTABLE] + counts[CellClass.UNPREVENTABLE]
+    judged = 45 - counts[CellClass.NOT_APPLICABLE]
+    assert f"avoids {counts[CellClass.AVOIDED]} of {judged} cells; " in page
+    assert f"{counts[CellClass.PREVENTABLE]} of its {hits} collisions were preventable." in page
 
 
 def test_text_of_a_user_is_escaped(tmp_path):

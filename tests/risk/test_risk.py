@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from markupsafe import escape
 from tests.approval import approve, refuses
 from tests.pages import without_theme
 
@@ -20,7 +21,8 @@ from bridgegen.jobs.risk.experiment import Experiment
 from bridgegen.jobs.risk.ledger import BATCHES
 from bridgegen.jobs.risk.outcomes import Column, outcomes
 from bridgegen.jobs.risk.risk import estimate_risk
-from bridgegen.pages.templates import number
+from bridgegen.pages.birdseye import ASPHALT
+from bridgegen.pages.templates import number, odds
 
 SCENARIO, DRIVER = "crossroads-s1", "route-follower"
 GIVEN = {"ego": DRIVER, "exposure": "uniform", "method": "mc", "precision": 0.0, "budget": 1200}
@@ -122,6 +124,18 @@ def test_the_page_says_it_without_scripts(risk):
     assert "<script" not in without_theme(page)
     assert not re.search(r"(src|href)=.https?:", page)
     assert page.count("<figure>") == len(risk.exposure.marginals)
+
+
+def test_the_most_likely_harm_is_seen_first_on_its_road_with_its_sentence(risk):
+    page = (risk.folder / "risk.html").read_text()
+    first, second = risk.most_likely[:2]
+    assert page.index(first.picture) < page.index("How likely") < page.index(second.picture)
+    assert str(escape(first.sentence)) in page
+    assert first.sentence.startswith("The ego")
+    asphalt = f'fill="{ASPHALT}"'
+    assert asphalt in first.picture.split("<animateTransform")[0]  # below all that moves
+    p = risk.by_mode[first.mode].probability.estimate
+    assert f"<b>{odds(p)} {'of ' if p >= 0.1 else ''}encounters</b>" in page
 
 
 @pytest.mark.parametrize("at", [1, 700])

@@ -25,6 +25,7 @@ from bridgegen.jobs.suite.sentences import difference, differences, headline
 from bridgegen.jobs.suite.suite import SuiteRun, evaluate_suite
 from bridgegen.pages.playback import Entity, Playback
 from bridgegen.pages.playbacks import diverged_at
+from bridgegen.pages.thumbnails import read_thumbnails
 from bridgegen.results.failures import read_failures, write_failures
 
 CRITERIA = {"criteria": ["C-1: always(ego.v < 12 m/s)"]}
@@ -297,6 +298,12 @@ def test_the_page_plays_the_worst_failure_of_each(folder, tmp_path):
         assert bool(motion["contacts"]) == bool(row.collisions)
         assert "twin" not in motion
         assert motions["names"][cells[one.entry]["motion"]] == f"{one.entry} ({one.ego})"
+    # What a dashboard shows of them without simulating.
+    kept = {(shown.entry, shown.ego): shown for shown in read_thumbnails(run.folder)}
+    assert kept.keys() == {(one.entry, one.ego) for one in failed}
+    for one in failed:
+        touches = kept[one.entry, one.ego].contact is not None
+        assert touches == bool(one.rows[one.worst].collisions)
     assert path.read_bytes() == write_suite_page(run, run.jobs).read_bytes()
 
 
@@ -362,6 +369,7 @@ def test_no_playback_of_files_that_have_changed(run, folder):
         file.write_text(file.read_text("utf-8") + "<!-- changed -->", "utf-8")
     suite = data_of(write_suite_page(run, run.jobs).read_text("utf-8"))["suite"]
     assert suite["motions"]["texts"] == []
+    assert read_thumbnails(run.folder) == ()
     assert not any("motion" in one for entry in suite["entries"] for one in entry["results"])
 
 

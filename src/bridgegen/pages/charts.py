@@ -314,6 +314,24 @@ def trend(some: Sequence[Point], label: str) -> Markup:
     return plot.svg(label)
 
 
+def columns(some: Sequence[tuple[int, Sequence[str]]], label: str) -> Markup:
+    """Return a chart of counts in the order of time, each over its lines of words."""
+    most, n = max(max(count for count, _ in some), 1), len(some)
+    plot = Plot((max(110.0 * n, 330.0), 210.0), (0.0, n), (0.0, most), (4.0, 4.0, 22.0, 58.0))
+    plot.add("path", class_="axis", d=f"M{plot.left:g} {plot.base:g}H{plot.right:g}")
+    for i, (count, lines) in enumerate(some):
+        x, y = plot.at(i + 0.5), plot.height(count)
+        kind = "bar some" if count else "bar"
+        title = element("title", f"{lines[0]}: {count:,}")
+        height = max(plot.base - y, 1.0)
+        plot.add("rect", title, class_=kind, x=x - 28.0, y=y, width=56.0, height=height)
+        plot.text(x, y - 6.0, f"{count:,}", kind="value")
+        for k, line in enumerate(lines):
+            short = line if len(line) <= 17 else f"…{line[-16:]}"
+            plot.text(x, plot.base + 17.0 + 16.0 * k, short)
+    return plot.svg(label, "chart columns")
+
+
 def strip(counts: Sequence[int]) -> Markup:
     """Return bins in a row, the fuller the darker; empty ones are outlined only."""
     most = max(counts, default=0) or 1

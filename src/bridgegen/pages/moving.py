@@ -1,7 +1,7 @@
 """An event as a moving picture: SVG that needs no script."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from bridgegen.base.arrays import Bool, Float
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.pages.birdseye import ASPHALT, GROUND, INK, PLAYERS, Camera, View, centre_of
 from bridgegen.pages.charts import element
-from bridgegen.pages.playback import Entity
+from bridgegen.pages.playback import Entity, Outline
 from bridgegen.pages.scenery import bodies
 from bridgegen.pages.svg import SvgDraw
 from bridgegen.simulation.rollout import Rollout
@@ -36,7 +36,8 @@ def moving_picture(
     most: int | None = None,
     follow: float | None = None,
     size: tuple[int, int] = SIZE,
-    lines: Sequence[Float] = (),
+    road: Iterable[Outline] = (),
+    lines: Iterable[Float] = (),
 ) -> Markup:
     """Return the picture of an event, seen from above, over and over.
 
@@ -50,10 +51,12 @@ def moving_picture(
         follow: metres from top to bottom of a view that follows the ego; by default the view holds
             the whole paths of both.
         size: of the picture [pixels].
-        lines: of the ground, such as borders of lanes, ``(n, 2)`` each [m].
+        road: below all, of a view that does not follow.
+        lines: likewise where no road is known, such as borders of lanes, ``(n, 2)`` each [m].
     """
     # From left to right: the picture is wide.
-    motion, lines = _turned(motion, lines)
+    start, turn = np.array([motion.x[0, 0, 0], motion.y[0, 0, 0]]), _turn(motion)
+    motion = _turned(motion, start, turn)
     kinds = [NAMES[code] for code in motion.kinds.tolist()] or ["car"] * len(motion.names)
     entities = bodies(motion, dict(zip(motion.names, kinds, strict=True)))[:most]
     n = min(int(motion.n_steps[0]), motion.shape[2])
@@ -65,7 +68,8 @@ def moving_picture(
     if follow is not None:
         camera = Camera(0.0, 0.0, size[1] / follow, (size[0] / 2, size[1] / 2))
     view = View(draw, camera, 1.2)
-    for line in filter(camera.sees, lines):
+    view.road(Outline(one.kind, (one.points - start) @ turn) for one in road)
+    for line in filter(camera.sees, ((line - start) @ turn for line in lines)):
         draw.line(camera.of(line), fill=BORDER)
     colours = {**dict.fromkeys(range(len(entities)), ASPHALT), other: PLAYERS[1], 0: PLAYERS[0]}
     moment = int(np.clip(round(when / motion.time_step), 0, n - 1))
@@ -91,19 +95,20 @@ def moving_picture(
     return Markup(draw.svg(title=caption, is_file=False))
 
 
-def _turned(motion: Rollout, lines: Sequence[Float]) -> tuple[Rollout, list[Float]]:
-    """Return motion and ground with the ego's way from left to right, from (0, 0) on."""
+def _turn(motion: Rollout) -> Float:
+    """Return the matrix ``(2, 2)`` that turns points so that the ego goes from left to right."""
     x, y = motion.x[0, 0], motion.y[0, 0]
     dx, dy = float(x[-1] - x[0]), float(y[-1] - y[0])
     angle = math.atan2(dy, dx) if math.hypot(dx, dy) > STANDS else float(motion.h[0, 0, 0])
     cosine, sine = math.cos(angle), math.sin(angle)
-    to_x, to_y = motion.x - x[0], motion.y - y[0]
-    turn = np.array([[cosine, -sine], [sine, cosine]])
-    moved = [(line - (float(x[0]), float(y[0]))) @ turn for line in lines]
-    turned = replace(
-        motion, x=to_x * cosine + to_y * sine, y=to_y * cosine - to_x * sine, h=motion.h - angle
-    )
-    return turned, moved
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def _turned(motion: Rollout, start: Float, turn: Float) -> Rollout:
+    """Return the motion with the ego's way from left to right, from (0, 0) on."""
+    points = (np.stack([motion.x, motion.y], axis=-1) - start) @ turn
+    angle = math.atan2(turn[1, 0], turn[0, 0])
+    return replace(motion, x=points[..., 0], y=points[..., 1], h=motion.h - angle)
 
 
 def _camera(poses: Float, size: tuple[int, int]) -> Camera:

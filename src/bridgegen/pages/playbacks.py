@@ -227,15 +227,20 @@ def diverged_at(first: Playback, second: Playback) -> int | None:
     return None if first.n_steps == second.n_steps else both - 1
 
 
-def nominal_playback(pipeline: Pipeline, name: str) -> Playback:
-    """Return the playback of a scenario with all parameters at their defaults.
+def nominal_playback(pipeline: Pipeline, name: str, x: Float | None = None) -> Playback:
+    """Return the playback of a scenario with all parameters at their defaults, or of a row.
 
     No objective is asked whether it is critical.
+
+    Args:
+        pipeline: of the scenario.
+        name: of the playback.
+        x: the row, ``(len(space.names),)``.
 
     Raises:
         FileFormatError: it has no result.
     """
-    X = pipeline.space.row({})[np.newaxis]
+    X = (pipeline.space.row({}) if x is None else x)[np.newaxis]
     # One row has one storyboard, hence one part.
     ((_, replay),) = pipeline.replays(X, plans=False).parts
     rollout = replay.rollout
@@ -338,7 +343,7 @@ def _course(replay: Replay, row: int) -> Course | None:
     number = np.full(max(ways) + 2, -1)  # -1 stays -1
     number[list(ways)] = range(len(ways))
     return Course(
-        ways=tuple(_thin(way) for way in ways.values()),
+        ways=tuple(thin(way) for way in ways.values()),
         steps=meant.steps,
         way=number[meant.way[row]],
         station=meant.station[row],
@@ -364,8 +369,8 @@ def _plans(replay: Replay, row: int) -> tuple[Planned, ...]:
     return tuple(found)
 
 
-def _thin(line: Float) -> Float:
-    """Return a line without the points that it does not need to stay within ``THIN`` of itself."""
+def thin(line: Float, tolerance: float = THIN) -> Float:
+    """Return a line ``(n, 2)`` without points it does not need to stay within a tolerance [m]."""
     kept = np.zeros(len(line), dtype=np.bool_)
     kept[[0, -1]] = True
     # Douglas and Peucker's simplification, with a stack in place of recursion, whose depth Python
@@ -384,7 +389,7 @@ def _thin(line: Float) -> Float:
             else np.hypot(*off.T)
         )
         worst = int(gap.argmax())
-        if gap[worst] > THIN:
+        if gap[worst] > tolerance:
             kept[first + 1 + worst] = True
             parts += [(first, first + 1 + worst), (first + 1 + worst, last)]
     return line[kept]

@@ -97,7 +97,12 @@ class SvgDraw:
         return Markup("".join(self._parts[1:]))
 
     def svg(
-        self, size: tuple[int, int] | None = None, title: str = "", *, is_file: bool = True
+        self,
+        size: tuple[int, int] | None = None,
+        title: str = "",
+        *,
+        is_file: bool = True,
+        **more: str,
     ) -> str:
         """Return the whole picture.
 
@@ -105,6 +110,7 @@ class SvgDraw:
             size: its width and height [pixels]; by default as large as where it is shown.
             title: what it says to those who do not see it.
             is_file: whether it may stand alone; in a page, it needs no namespace.
+            more: further attributes of it, or others in place of its own.
         """
         given = {"class": "birdseye", "role": "img"}
         given |= {"xmlns": "http://www.w3.org/2000/svg"} if is_file else {}
@@ -112,6 +118,7 @@ class SvgDraw:
         given |= {"font-family": "DejaVu Sans, Verdana, sans-serif"}
         if size:
             given |= {"width": str(size[0]), "height": str(size[1])}
+        given |= more
         named = [f"<title>{html.escape(title)}</title>"] if title else []
         return "\n".join([f"<svg {_attributes(given)}>", *named, *self._parts, "</svg>\n"])
 

@@ -115,6 +115,7 @@ class Cell:
         mode: id of the failure mode whose status the text is.
         links: address, text and label of further links, below it.
         more: after these.
+        picture: above all of it, `Markup` of ours.
     """
 
     text: str
@@ -128,6 +129,7 @@ class Cell:
     mode: str = ""
     links: Sequence[tuple[str, str, str]] = ()
     more: str = ""
+    picture: str = ""
 
 
 def shown(value: object) -> object:

@@ -5,6 +5,8 @@ from collections.abc import Iterator, Sequence
 from math import inf
 from pathlib import Path
 
+from markupsafe import Markup
+
 from bridgegen.drivers.drivers import available
 from bridgegen.drivers.planners import DOMAINS
 from bridgegen.engine.domain import in_words
@@ -14,6 +16,10 @@ from bridgegen.jobs.benchmark.results import Outcome, Standing
 from bridgegen.jobs.compare.words import number
 from bridgegen.pages import templates
 from bridgegen.pages.templates import counted
+from bridgegen.pages.thumbnails import drawn, read_thumbnails
+
+MOST_PICTURES, SIZE = 60, (120, 74)
+"""Largest number of thumbnails, and the size of each [pixels]."""
 
 
 def write_page(
@@ -39,8 +45,21 @@ def write_page(
             for name in plan.scenarios
         ],
         careful=CAREFUL, columns=COLUMNS, sensed=COLUMNS[SENSED], domains=DOMAINS,
-        seeds=plan.seeds, command=plan.command(), anchor=_anchor, short=_short, said=_said,
+        pictures=_pictures(path.parent, found), seeds=plan.seeds, command=plan.command(),
+        anchor=_anchor, short=_short, said=_said,
     )  # fmt: skip
+
+
+def _pictures(folder: Path, found: Sequence[Outcome]) -> dict[str, Markup]:
+    """Return pictures of the failure modes that runs keep one of, by where their playback is."""
+    pictures: dict[str, Markup] = {}
+    for way in (way for outcome in found for way in outcome.ways if way.playback):
+        if len(pictures) == MOST_PICTURES:
+            break
+        for shown in read_thumbnails((folder / way.playback.partition("#")[0]).parent):
+            if shown.caption == way.title:
+                pictures[way.playback] = drawn(shown, f"t{len(pictures)}", SIZE)
+    return pictures
 
 
 def _lead(standings: Sequence[Standing]) -> str:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import accumulate, groupby
 from typing import Any
 from urllib.parse import quote
@@ -12,19 +13,21 @@ from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
 from bridgegen.jobs.dashboard.odd import Coverage, Covered
 from bridgegen.jobs.dashboard.requirements import Matrix, statements
-from bridgegen.jobs.dashboard.results import Result, versions
+from bridgegen.jobs.dashboard.results import Result, driver_of, versions
 from bridgegen.jobs.dashboard.results_of import SuiteLine
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
 from bridgegen.jobs.dashboard.taxonomy import SOURCE
 from bridgegen.jobs.dashboard.trends import Series
+from bridgegen.jobs.dashboard.verdicts import Standing, Step, Verdict, history, standings
 from bridgegen.pages import charts, templates
 from bridgegen.pages.sentences import share
 from bridgegen.pages.templates import Banner, Cell, counted, joined, when
+from bridgegen.pages.thumbnails import Thumbnail, drawn, read_thumbnails
 from bridgegen.results.failures import FILE
 
-MOST_MODES = 500
+MOST_MODES = 300
 """Largest number of failure modes of a table; the others are counted."""
-MOST_RESULTS = 5
+MOST_RESULTS = 3
 """Largest number of results of a failure mode that are linked."""
 MOST_REQUIREMENTS, MOST_SCENARIOS = 40, 200
 """Largest numbers of columns and rows of a matrix; the gravest requirements."""
@@ -36,6 +39,14 @@ MOST_ROWS = 2000
 """Largest number of rows of a table."""
 MOST_PARAMETERS, MOST_BIN_ROWS = 60, 1000
 """Largest numbers of parameters of a scenario, and of all scenarios."""
+MOST_TRIED, MOST_DRIVERS = 100, 20
+"""Largest numbers of scenarios and drivers of the matrix of verdicts; what fails comes first."""
+MOST_PICTURES, FEW = 60, 8
+"""Largest number of its pictures, and number of scenarios from which on they are smaller."""
+LARGE, SMALL = (150, 92), (96, 59)
+"""Sizes of them [pixels]."""
+MOST_STEPS, MOST_HISTORIES = 12, 24
+"""Largest numbers of versions of a driver, the latest, and of drivers that charts show."""
 OPEN_MATRICES, OPEN = 40, 12
 """Numbers of rows beyond which matrices, and other tables, are folded."""
 
@@ -73,6 +84,8 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         problems=found.project.problems,
         verdict=banner(found),
         file=FILE,
+        verdicts=_verdicts(found, base),
+        histories=_histories(found),
         notes=found.notes[:MOST_RESULTS],
         modes=modes_table("Failure modes of current results", found.failing, base),
         before=modes_table(
@@ -104,6 +117,9 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         once=_once([trend for trend in found.trends if len(trend.points) == 1], base),
         source=SOURCE,
         counts=found.coverage.counts,
+        covered="Taxonomy: {} covered, {} not covered, {} not expressible".format(
+            *found.coverage.counts
+        ),
         attributes=[*_attributes(found.coverage.attributes)],
         partly=sorted(partly),
         parameters=_parameters(found.coverage),
@@ -177,6 +193,90 @@ def _span(value: float, low: float, high: float) -> str | tuple[str, str]:
 def within(sizes: Iterable[int], most: int) -> int:
     """Return how many parts fit, by their sizes; the first always does."""
     return max(1, sum(number <= most for number in accumulate(sizes)))
+
+
+# --- The first screen: a verdict for each scenario and driver ---
+
+_MARKS: dict[Verdict, tuple[str, str]] = {
+    "fails": ("✕ ", "bad"),
+    "no failure found": ("✓ ", "good"),
+    "not judged": ("? ", "open"),
+    "never tried": ("○ ", "muted"),
+}
+
+
+def _verdicts(found: Dashboard, base: str) -> dict[str, Any]:
+    """Return the matrix of scenarios and drivers, with pictures of the gravest failures."""
+    stands = standings(found.project.results, found.failing)
+    failures = {key: len(standing.modes) for key, standing in stands.items()}
+
+    def ordered(axis: int) -> list[str]:
+        names = {key[axis] for key in stands}
+        fails = {name: sum(n for key, n in failures.items() if key[axis] == name) for name in names}
+        return sorted(names, key=lambda name: (-fails[name], name))
+
+    scenarios, drivers = ordered(0), ordered(1)
+    rows, heads = scenarios[:MOST_TRIED], drivers[:MOST_DRIVERS]
+    shown = [(row, head) for row in rows for head in heads if failures.get((row, head))]
+    shown.sort(key=lambda key: -stands[key].modes[0].severity)
+    kept = {key: _picture_of(found, stands[key]) for key in shown[:MOST_PICTURES]}
+    is_small = len(rows) > FEW
+    size = SMALL if is_small else LARGE
+    pictures = {
+        key: drawn(picture, f"t{i}", size)
+        for i, (key, picture) in enumerate(kept.items())
+        if picture is not None
+    }
+    cells: list[Row] = []
+    for scenario in rows:
+        row: list[object] = [scenario]
+        for driver in heads:
+            standing = stands.get((scenario, driver), Standing("never tried"))
+            picture = pictures.get((scenario, driver), "")
+            # A small picture has its words where the pointer is: more scenarios are on one screen.
+            is_brief = is_small and bool(picture)
+            cell = _standing(standing, f"{driver} in {scenario}", base, is_brief=is_brief)
+            row.append(replace(cell, picture=picture))
+        cells.append(row)
+    left = [
+        f"{counted(number, noun)} left out"
+        for number, noun in (
+            (len(scenarios) - len(rows), "scenario"),
+            (len(drivers) - len(heads), "driver"),
+            (len(shown) - MOST_PICTURES, "picture"),
+        )
+        if number > 0
+    ]
+    table = _table("Verdicts by scenario and driver", ("scenario", *heads), cells, kind="verdicts")
+    return {**table, "left": ", ".join(left), "pictures": len(pictures)}
+
+
+def _standing(standing: Standing, where: str, base: str, *, is_brief: bool) -> Cell:
+    words, text, note = standing.verdict, str(standing.verdict), ""
+    if standing.modes:
+        text = f"FAILS, {counted(len(standing.modes), 'mode')}"
+        severity = standing.modes[0].severity
+        # In short: who is responsible, and why, is in the table of failure modes.
+        title = "" if is_brief else standing.modes[0].title.partition(" (")[0]
+        note = " · ".join(filter(None, (title, f"MAIS3+ {share(severity)}" if severity else "")))
+    worst = standing.worst
+    href = _address(base, worst.page) if worst is not None else ""
+    mark = _MARKS[words]
+    label, notes = f"{where}: {text}", [note] if note else []
+    return Cell(text, notes, kind=mark[1], href=href, label=label, mark=mark)
+
+
+def _picture_of(found: Dashboard, standing: Standing) -> Thumbnail | None:
+    """Return what is kept with the results of the gravest mode, the latest first."""
+    folder = found.project.folder
+    for result in standing.modes[0].results[:MOST_RESULTS]:
+        for picture in read_thumbnails(folder / result.source):
+            is_ego = not picture.ego or driver_of(picture.ego, folder, "").label == (
+                result.driver.label
+            )
+            if picture.entry == result.entry and is_ego:
+                return picture
+    return None
 
 
 # --- Failure modes: what fails now, what failed before ---
@@ -319,6 +419,25 @@ def chart(series: Series, base: str) -> str:
     ]
     latest = ", ".join(f"{point.driver} {share(point.share)}" for point in series.points[-5:])
     return charts.trend(points, f"{series.measure} of {series.driver} in {series.title}: {latest}")
+
+
+def _histories(found: Dashboard) -> list[tuple[str, str]]:
+    """Return a chart of failure modes for each driver that has several versions."""
+    some = {name: steps for name, steps in history(found.project.results).items() if steps[1:]}
+    most = sorted(some, key=lambda name: (-len(some[name]), name))[:MOST_HISTORIES]
+    return [(name, _history(name, some[name][-MOST_STEPS:])) for name in most]
+
+
+def _history(name: str, steps: Sequence[Step]) -> str:
+    columns = [
+        (
+            step.modes,
+            (step.name, when(step.time)[:10], f"{step.failing} of {step.scenarios} fail"),
+        )
+        for step in steps
+    ]
+    words = "; ".join(f"{step.name} {counted(step.modes, 'failure mode')}" for step in steps)
+    return charts.columns(columns, f"Failure modes of {name} by version: {words}")
 
 
 def _versions(found: Dashboard) -> Table:

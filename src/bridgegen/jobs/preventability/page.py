@@ -2,9 +2,10 @@
 
 import base64
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
@@ -12,13 +13,19 @@ from PIL import Image
 from bridgegen.base.arrays import Float
 from bridgegen.base.units import percent
 from bridgegen.jobs.preventability.classes import CellClass, Codes
+from bridgegen.jobs.preventability.grid import Grid
 from bridgegen.jobs.preventability.result import PreventabilityMap
 from bridgegen.pages import charts, templates
+from bridgegen.pages.templates import counted
+from bridgegen.pages.thumbnails import drawn
+
+if TYPE_CHECKING:
+    from bridgegen.jobs.preventability.pictures import CellPicture
 
 COLOURS = {
     CellClass.AVOIDED: "#56b4e9",
     CellClass.PREVENTABLE: "#d55e00",
-    CellClass.UNPREVENTABLE: "#3d3d3d",
+    CellClass.UNPREVENTABLE: "#8a8a8a",
     CellClass.NOT_APPLICABLE: "#c9ced6",
     CellClass.NO_RESULT: "#cc79a7",
 }
@@ -52,8 +59,20 @@ BLOCKS = 12
 """Largest number of combinations of values of further axes that are drawn."""
 
 
-def write_page(path: Path, result: PreventabilityMap) -> None:
+WIDE, BESIDE = (640.0, 420.0), (380.0, 270.0)
+SMALL = (254.0, 190.0)
+"""Sizes of a picture that is alone in its row, of each of up to three, and of more [pixels]."""
+
+
+def write_page(
+    path: Path, result: PreventabilityMap, pictures: Sequence["CellPicture"] = ()
+) -> None:
     """Write the page, whole or not at all.
+
+    Args:
+        path: of it.
+        result: the map.
+        pictures: cells that are played.
 
     Raises:
         StorageError: it cannot be written.
@@ -72,7 +91,19 @@ def write_page(path: Path, result: PreventabilityMap) -> None:
         legend=[(COLOURS[class_], class_.label) for class_ in CellClass if class_ in there],
         shown=len(shown),
         combinations=len(combinations),
-        blocks=[_block(result, at) for at in shown],
+        blocks=[_block(result, at, pictures) for at in shown],
+        played=[
+            (
+                number,
+                drawn(picture.shown, f"t{number}"),
+                COLOURS[picture.kind],
+                f"{picture.kind.label}, {picture.place}",
+                f"{picture.shown.caption.removesuffix('.').partition(';')[0]}.",
+                picture.driver,
+                ", ".join(_value(result, axis, i) for axis, i in enumerate(picture.cell)),
+            )
+            for number, picture in enumerate(pictures, 1)
+        ],
         models=result.models,
         command=result.command,
     )
@@ -104,10 +135,13 @@ def _lead(result: PreventabilityMap) -> str:
     sentences = []
     for driver in map(result.figures, result.drivers):
         judged = sum(driver[name.name.lower()] for name in CellClass if name < 3)
-        sentences.append(
-            f"{driver['driver']} avoids {_share(driver['avoided'], judged)} of {judged:,} cells; "
-            f"{_share(driver['preventable'], judged)} end in a collision that a model avoids."
-        )
+        hits = driver["preventable"] + driver["unpreventable"]
+        words = f"{driver['driver']} avoids {driver['avoided']:,} of {counted(judged, 'cell')}"
+        if hits:
+            verb = "was" if driver["preventable"] == 1 else "were"
+            words += f"; {driver['preventable']:,} of its {counted(hits, 'collision')} {verb}"
+            words += " preventable"
+        sentences.append(f"{words}.")
     return " ".join(sentences)
 
 
@@ -124,19 +158,41 @@ def _counts(result: PreventabilityMap, driver: str) -> Iterator[int | tuple[int,
         yield (counts[class_], _share(counts[class_], judged)) if applies else counts[class_]
 
 
-def _block(result: PreventabilityMap, further: tuple[int, ...]) -> dict[str, object]:
+def drawn_columns(grid: Grid) -> list[int]:
+    """Return the numbers of the third axis' values that are drawn; none without such an axis."""
+    return _spread(grid.shape[2], PANELS) if len(grid.shape) > 2 else []
+
+
+def _block(
+    result: PreventabilityMap, further: tuple[int, ...], pictures: Sequence["CellPicture"]
+) -> dict[str, object]:
     """Return the pictures of one block: a row a driver, a column a value of the third axis."""
-    grid = result.grid
-    has_third, plane = len(grid.shape) > 2, (slice(None),) * min(len(grid.shape), 2)
-    columns = _spread(grid.shape[2], PANELS) if has_third else []
+    grid, columns = result.grid, drawn_columns(result.grid)
+    plane = (slice(None),) * min(len(grid.shape), 2)
     places: list[tuple[int, ...]] = [(column, *further) for column in columns] or [()]
     return {
         "label": ", ".join(_value(result, 3 + k, i) for k, i in enumerate(further)),
         "columns": [_value(result, 2, column) for column in columns],
-        "all": grid.shape[2] if has_third else 0,
-        "third": grid.names[2] if has_third else "",
+        "all": grid.shape[2] if columns else 0,
+        "third": grid.names[2] if columns else "",
         "rows": [
-            (name, [_picture(result, result.classes[name][plane + at], name) for at in places])
+            (
+                name,
+                [
+                    _picture(
+                        result,
+                        result.classes[name][plane + at],
+                        name,
+                        {
+                            number: picture.cell[:2]
+                            for number, picture in enumerate(pictures, 1)
+                            if (picture.driver, picture.cell[2:]) == (name, at)
+                        },
+                        WIDE if len(places) == 1 else BESIDE if len(places) <= 3 else SMALL,
+                    )
+                    for at in places
+                ],
+            )
             for name in result.drivers
         ],
     }
@@ -147,8 +203,22 @@ def _value(result: PreventabilityMap, axis: int, i: int) -> str:
     return f"{grid.names[axis]} = {grid.values[axis][i]:.4g} {grid.units[axis]}"
 
 
-def _picture(result: PreventabilityMap, codes: Codes, driver: str) -> str:
-    """Return one picture with its axes: the first across, the second, if there is one, up."""
+def _picture(
+    result: PreventabilityMap,
+    codes: Codes,
+    driver: str,
+    marks: Mapping[int, tuple[int, ...]],
+    size: tuple[float, float],
+) -> str:
+    """Return one picture with its axes: the first across, the second, if there is one, up.
+
+    Args:
+        result: the map.
+        codes: of its cells.
+        driver: under test.
+        marks: the cells that are played, by their numbers; these lead there.
+        size: of the picture [pixels].
+    """
     grid = result.grid
     flat = codes[:, np.newaxis] if codes.ndim == 1 else codes
     (x, x_label), *second = (
@@ -156,9 +226,19 @@ def _picture(result: PreventabilityMap, codes: Codes, driver: str) -> str:
         for name, unit, values in zip(grid.names, grid.units, grid.values, strict=True)
     )
     y, y_label = second[0] if second else ((0.0, 1.0), "")
-    plot = charts.Plot((254.0, 190.0), x, y, (46.0, 8.0, 6.0, 38.0))
+    plot = charts.Plot(size, x, y, (46.0, 8.0, 6.0, 38.0))
     plot.image(data_uri(flat.T[::-1]))
     plot.frame(x_label, y_label, 6)
+    for number, cell in marks.items():
+        i, k = (*cell, 0)[:2]
+        # The picture's cells share its width evenly.
+        u = plot.left + (i + 0.5) / flat.shape[0] * (plot.right - plot.left)
+        v = plot.base - (k + 0.5) / flat.shape[1] * (plot.base - plot.top)
+        kind = CellClass(int(flat[i, k])).label
+        title = charts.element("title", f"{number}: {kind}")
+        dot = charts.element("circle", cx=u, cy=v, r=9.0)
+        text = charts.element("text", number, x=u, y=v + 4.0, text_anchor="middle")
+        plot.add("a", title, dot, text, class_="mark", href=f"#cell-{number}")
     return plot.svg(f"{driver}, {grid.names[0]} across")
 
 

@@ -18,6 +18,7 @@ from bridgegen.jobs.preventability import arithmetic
 from bridgegen.jobs.preventability.classes import Codes, Outcome, outcomes
 from bridgegen.jobs.preventability.grid import Grid, grid_of
 from bridgegen.jobs.preventability.options import MapOptions
+from bridgegen.jobs.preventability.pictures import cell_pictures
 from bridgegen.jobs.preventability.result import ChunkStore, PreventabilityMap, simulated
 from bridgegen.jobs.search.scenarios import driven_by, load
 from bridgegen.scenario.language.scenario import SearchedScenario
@@ -93,11 +94,12 @@ def map_preventability(given: MapOptions) -> PreventabilityMap:
                 found[:, start:stop] = part
                 done = stop
                 say.progress("cells", done, cells.cells, "")
+            shaped = found.reshape(len(names), *cells.shape)
+            result = PreventabilityMap(logical, cells, drivers, judges, shaped, command, folder)
+            pictures = [*cell_pictures(result, run.pipeline)]
     except KeyboardInterrupt:
         raise Interrupted(folder, done, cells.cells, what="cells", command=command) from None
-    shaped = found.reshape(len(names), *cells.shape)
-    result = PreventabilityMap(logical, cells, drivers, judges, shaped, command, folder)
-    result.write()
+    result.write(pictures)
     return result
 
 
@@ -138,19 +140,25 @@ class _Run:
             open_ &= found[m] != Outcome.AVOIDED
         return found
 
-    def _outcomes(self, name: str, X: Float) -> Codes:
-        if not len(X):
-            return np.empty(0, np.int8)
-        if name in arithmetic.NAMES:
-            return arithmetic.outcomes(name, self._scenario.name, self._grid.space, X)
-        if name not in self._pipelines:
+    def pipeline(self, name: str) -> Pipeline | None:
+        """Return a driver's pipeline; None of one that is arithmetic and has no motion."""
+        if name not in self._pipelines and name not in arithmetic.NAMES:
             self._say.compile()
             options = PipelineOptions(ego=name, vehicle=self._vehicle)
             made = Pipeline(self._scenario, self._grid.space, options, workers=self._workers)
             made.warm_up()
             self._pipelines[name] = made
+        return self._pipelines.get(name)
+
+    def _outcomes(self, name: str, X: Float) -> Codes:
+        if not len(X):
+            return np.empty(0, np.int8)
+        if name in arithmetic.NAMES:
+            return arithmetic.outcomes(name, self._scenario.name, self._grid.space, X)
+        made = self.pipeline(name)
+        assert made is not None
         parts = []
-        for part in self._workers.map(self._pipelines[name], outcomes, X):
+        for part in self._workers.map(made, outcomes, X):
             if isinstance(part.result, Lost):
                 parts.append(np.full(part.rows, Outcome.FAILED, np.int8))
             else:

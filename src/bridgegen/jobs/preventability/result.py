@@ -21,6 +21,7 @@ from bridgegen.jobs.preventability.options import FIGURES
 from bridgegen.results.folder import claim
 
 if TYPE_CHECKING:
+    from bridgegen.jobs.preventability.pictures import CellPicture
     from bridgegen.scenario.language.scenario import SearchedScenario
 
 ARRAYS, TABLE, SUMMARY, PAGE = "map.npz", "map.parquet", "summary.json", "preventability.html"
@@ -138,8 +139,11 @@ class PreventabilityMap:
             of=driver,
         )
 
-    def write(self) -> tuple[Path, ...]:
+    def write(self, pictures: Sequence["CellPicture"] = ()) -> tuple[Path, ...]:
         """Write arrays, figures, the page, and a table where the extra for Parquet is there.
+
+        Args:
+            pictures: cells that the page plays.
 
         Raises:
             StorageError: they cannot be written.
@@ -165,7 +169,7 @@ class PreventabilityMap:
             "drivers": [self.figures(name) for name in self.drivers],
         }
         write_whole(paths[1], [json.dumps(figures, indent=1).encode()])
-        write_page(paths[2], self)
+        write_page(paths[2], self, pictures)
         # The table is a copy for other tools; the arrays hold all of it, and pyarrow (150 MB) is an
         # extra.
         if is_installed("parquet"):

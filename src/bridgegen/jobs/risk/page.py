@@ -5,6 +5,7 @@ from pathlib import Path
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.units import percent
+from bridgegen.jobs.risk.estimators.weighted import Probability
 from bridgegen.jobs.risk.options import WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS
 from bridgegen.jobs.risk.result import Finding, ParameterShare, Risk
@@ -36,16 +37,26 @@ def write_page(path: Path, risk: Risk) -> None:
         ],
         modes=[[words, *_cells(finding)] for words, finding in risk.by_mode.items()],
         parameters=[(parameter, _shares(parameter)) for parameter in risk.parameters],
-        likely=[(likely, [*_values(risk, likely.x)]) for likely in risk.most_likely],
+        likely=[
+            (likely, _often(finding.probability if finding else None), [*_values(risk, likely.x)])
+            for likely in risk.most_likely
+            for finding in (risk.by_mode.get(likely.mode),)
+        ],
         unsure=[*unsure(risk)],
         command=risk.command,
     )
 
 
 def _banner(risk: Risk) -> Banner:
-    p = risk.probability(risk.event)
-    often = odds(p.estimate) if p is not None and p.estimate > 0.0 else ""
-    return Banner(sentence(risk), word=f"{often} encounters" if often else "")
+    return Banner(sentence(risk), word=_often(risk.probability(risk.event)))
+
+
+def _often(probability: Probability | None) -> str:
+    """Return how often something happens, in words; "" where that is not known, or never."""
+    if probability is None or not probability.estimate > 0.0:
+        return ""
+    words = odds(probability.estimate)
+    return f"{words} of encounters" if words.endswith("%") else f"{words} encounters"
 
 
 def facts(risk: Risk) -> Iterator[str]:

@@ -75,12 +75,14 @@ class Likely:
         x: its row, ``(len(space.names),)``.
         name: of its scenario's files, without suffix.
         picture: it as a moving picture, SVG.
+        sentence: what happens.
     """
 
     mode: str
     x: Float
     name: str
     picture: str
+    sentence: str
 
 
 @dataclass(frozen=True)

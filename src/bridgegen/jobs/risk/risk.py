@@ -38,6 +38,7 @@ from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.jobs.search.scenarios import driven_by, load
 from bridgegen.pages.moving import moving_picture
+from bridgegen.pages.scenery import Scenery
 from bridgegen.results.store import Store
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.scenario.exposure.fit import Fit, fit_exposure
@@ -126,8 +127,10 @@ def write_most_likely(
         first = max(instant - round(BEFORE / step), 0)
         shown = _between(rollout, first, instant + round(AFTER / step) + 1)
         caption = f"the most likely harmful encounter ({mode}), from above"
-        picture = moving_picture(shown, other, (instant - first) * step, caption)
-        found.append(Likely(mode, x, name, picture))
+        road = Scenery(pipeline.runner).road(x).outlines
+        picture = moving_picture(shown, other, (instant - first) * step, caption, road=road)
+        words = conflict.sentence if conflict is not None else ""
+        found.append(Likely(mode, x, name, picture, words))
     return tuple(found)
 
 

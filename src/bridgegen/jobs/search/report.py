@@ -17,6 +17,7 @@ from bridgegen.pages.data import WHOLE, ReportData, only
 from bridgegen.pages.packed import packed_files
 from bridgegen.pages.page import report_page, write_report
 from bridgegen.pages.templates import Banner, joined
+from bridgegen.pages.thumbnails import Thumbnail, thumbnail, write_thumbnails
 from bridgegen.results.confirmation.record import read_records
 from bridgegen.results.store import Recorded, Rows, Store
 from bridgegen.search.regions.record import JSON_FILE, read_record
@@ -73,6 +74,7 @@ def write_run_report(
     files = {name: read_inside(run.folder, name) for name in names}
     data = run_data(pipeline, run, rows, exported, files=files, more=True, replays=replays)
     write_report(run.report, data)
+    write_thumbnails(run.folder, [_thumbnail(data)])
     return run.report
 
 
@@ -149,6 +151,18 @@ def write_finding_page(
         page = finding_page(pipeline, Run.of(store, rows), rows, name)
     write_whole(out, [page])
     return out
+
+
+def _thumbnail(data: ReportData) -> Thumbnail | None:
+    """Return the picture of the gravest failure mode that is exported, or of the worst scenario."""
+    played = {playback.name: playback for playback in data.kept}
+    modes = data.triage.modes if data.triage is not None else ()
+    for mode in sorted(modes, key=lambda mode: -mode.severity):
+        for name in mode.exports:
+            if name in played:
+                return thumbnail(played[name], mode.title)
+    worst = next((playback for playback in data.kept if playback.critical), None)
+    return thumbnail(worst, "the most critical scenario") if worst is not None else None
 
 
 def run_data(

@@ -22,6 +22,7 @@ from bridgegen.pages.payload import script_json
 from bridgegen.pages.playback import Playback
 from bridgegen.pages.playbacks import beside_others, measured_playbacks
 from bridgegen.pages.templates import Banner
+from bridgegen.pages.thumbnails import Thumbnail, thumbnail, write_thumbnails
 from bridgegen.simulation.choice import EMBEDDED
 
 FILE = "suite.html"
@@ -68,8 +69,24 @@ def write_suite_page(
         if result.verdict == "failed" and key_of(result) in by_key
     }
     found = suite_difference(suite)
-    motions = _worst(suite, by_key) if found is None else _pairs(suite, by_key, found)
-    return _write(suite, list(motions), commands, searches, maps)
+    motions = list(_worst(suite, by_key) if found is None else _pairs(suite, by_key, found))
+    write_thumbnails(suite.folder, _thumbnails(suite, motions))
+    return _write(suite, motions, commands, searches, maps)
+
+
+def _thumbnails(suite: SuiteRun, motions: Sequence[Motion]) -> Iterator[Thumbnail | None]:
+    """Yield what other pages show of the entries that fail: the worst variation of each."""
+    played = {
+        (motion.entry, ego, motion.row): playback
+        for motion in motions
+        for ego, playback in zip(motion.egos[::-1], (motion.playback, motion.twin), strict=False)
+        if playback is not None
+    }
+    for result in suite.results:
+        playback = played.get((*key_of(result), result.worst or 0))
+        if playback is not None and result.worst is not None:
+            words = f"{result.entry}: {result.rows[result.worst].conflict_type or 'critical'}"
+            yield thumbnail(playback, words, entry=result.entry, ego=result.ego or result.driver)
 
 
 def write_replay_page(made: Replayed) -> Path:
