@@ -65,9 +65,15 @@ def texts() -> Iterator[tuple[str, str]]:
     for path in PAGES:
         yield path.stem, prose(path)
     for path in SOURCES.rglob("*.html"):
-        yield f"{path.parent.relative_to(SOURCES)}/{path.stem}".removeprefix("pages/"), template(path)
+        yield (
+            f"{path.parent.relative_to(SOURCES)}/{path.stem}".removeprefix("pages/"),
+            template(path),
+        )
     for name, command in commands(get_command(app)):
-        yield f"bridgegen {name}", " ".join(str(getattr(one, "help", "")) for one in (command, *command.params))
+        yield (
+            f"bridgegen {name}",
+            " ".join(str(getattr(one, "help", "")) for one in (command, *command.params)),
+        )
 
 
 def found(word: str, text: str, allowed: tuple[str, ...] = ()) -> list[str]:
