@@ -17,8 +17,9 @@ SOURCES = Path(bridgegen.__file__).parent
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
 
 WORDS = {
-    r"accidents?": ("accident rate", "type of accident", "Accident Analysis", "road works, accidents",
-                    "right-turning accidents"),  # names of others; the paper's third layer
+    # Names of others; the paper's third layer.
+    r"accidents?": ("accident rate", "type of accident", "Accident Analysis",
+                    "road works, accidents", "right-turning accidents"),
     r"hits?": (),
     r"encounters?": ("per encounter",),
     r"incidents?": ("boxes and incidents, with CARLA",),
