@@ -30,8 +30,8 @@ WORDS = {
 
 EXCEPTIONS = {
     # On the road, an encounter is what an exposure counts; it is no evaluation.
-    r"encounters?": ("estimate-risk", "exposure", "regions", "risk", "jobs/risk/page", "web/page",
-                     "bridgegen analyse regions"),
+    r"encounters?": ("estimate-risk", "exposure", "recordings", "regions", "risk",
+                     "jobs/risk/page", "web/page", "bridgegen analyse regions"),
     # Cells of maps, of a regulation's matrices, of an algorithm's archive, of a notebook.
     r"cells?": ("algorithms", "ci", "packs", "preventability", "python-guide", "suites",
                 "jobs/preventability/page"),
