@@ -1,5 +1,6 @@
 """A stand-in for a pipeline: what is harmful is a formula of the row and of the fix."""
 
+from copy import copy
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -50,6 +51,8 @@ class World:
     ):
         self.space, self._harm, self.fixes, self._label = space, harm, tuple(fixes), label
         self._seen, self._spoiled, self._rule = seen, spoiled, rule
+        self.embedded, self.at_step = SimpleNamespace(time_step=0.05), lambda v, steps, harm: harm
+        self.steps = 1
         self._fails, self.kinds = fails, {"ego": "car", "bv": "truck"}
         self.scenario = SimpleNamespace(name="planted")
         self.driver = SimpleNamespace(label="driver")
@@ -60,6 +63,11 @@ class World:
     def runner(self):
         """The stand-in of the runner is the same."""
         return self
+
+    def elsewhere(self, simulator):
+        other = copy(self)
+        other.steps = simulator.finer
+        return other
 
     def values(self, X):
         return {name: X[:, k] for k, name in enumerate(self.space.names)}
@@ -72,7 +80,7 @@ class World:
         ok = np.ones(n, bool)
         if self._fails is not None:
             ok = ~(self._fails(v) if self._spoiled is None else self._fails(v, fix))
-        harm = np.where(ok, self._harm(v, fix), 0.0)
+        harm = np.where(ok, self.at_step(v, self.steps, self._harm(v, fix)), 0.0)
         kind = np.full(n, "front-to-rear striking", object)
         if self._label is not None:
             kind = np.asarray(self._label(v), object)

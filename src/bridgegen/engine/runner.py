@@ -185,12 +185,11 @@ class Runner:
 
     def _take_storyboard(self, nominal: ConcreteScenario) -> None:
         """Make the simulators ready for the storyboard of a concrete scenario."""
-        self.embedded = EmbeddedSimulator(
-            nominal.storyboard,
-            self.scenario.name,
-            driver=self._given_driver,
-            vehicle=self._vehicle,
-        )
+        name, given = self.scenario.name, {"driver": self._given_driver, "vehicle": self._vehicle}
+        self.embedded = EmbeddedSimulator(nominal.storyboard, name, **given)
+        if (finer := self._choice.finer) > 1:
+            step = self.embedded.time_step / finer
+            self.embedded = EmbeddedSimulator(nominal.storyboard, name, time_step=step, **given)
         self.simulator: Simulator[Any] = self._choice.around(self.embedded, nominal.storyboard)
 
     def _static_roads(self, nominal: ConcreteScenario) -> Any:

@@ -9,6 +9,7 @@ from bridgegen.pages.playback import Conflict
 from bridgegen.search.triage.influence import ends_in_words
 from bridgegen.search.triage.judgement import judgement
 from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
+from bridgegen.search.triage.words import step_in_words, steps_in_words
 
 FINDING_FIELDS = ("conflict", "conflict_type", "responsible", "rule", "partner")
 """The fields of a row's finding, in the page's order."""
@@ -77,7 +78,8 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "ego": found.ego,
         "baseline": found.baseline,
         "modes": [
-            _mode(mode, found.neighbourhood(mode.shown)) for mode in found.modes[:MOST_MODES]
+            _mode(mode, found.neighbourhood(mode.shown)) | {"step": step_in_words(mode, found)}
+            for mode in found.modes[:MOST_MODES]
         ],
         "more": max(0, len(found.modes) - MOST_MODES) + found.unrecorded_modes,
         "robust": found.robust,
@@ -94,11 +96,8 @@ def triage_payload(found: Triage) -> dict[str, Any]:
             }
             for influence in found.influences
         ],
-        "judged": {
-            neighbourhood.evaluation: neighbourhood.judgement
-            for neighbourhood in found.neighbourhoods
-            if neighbourhood.judgement
-        },
+        "steps": steps_in_words(found),
+        "judged": _judged(found),
         "bound": {
             "sentence": found.bound.in_full,
             "judged": found.bound.judged,
@@ -109,6 +108,15 @@ def triage_payload(found: Triage) -> dict[str, Any]:
             "least": [least.model_dump() for least in found.bound.least],
         },
     }
+
+
+def _judged(found: Triage) -> dict[int, str]:
+    """Return what is said of evaluations: their root cause, and if they hang on the time step."""
+    said = {item.evaluation: [item.judgement] for item in found.neighbourhoods if item.judgement}
+    for check in found.step_checks:
+        if check.sentence:
+            said.setdefault(check.evaluation, []).append(check.sentence)
+    return {evaluation: "; ".join(texts) for evaluation, texts in said.items()}
 
 
 def _mode(mode: Mode, tested: Neighbourhood | None) -> dict[str, Any]:

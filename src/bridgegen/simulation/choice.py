@@ -119,6 +119,7 @@ class SimulatorChoice:
         settings: what changes its results; recorded with a run.
         access: where it is on this machine. Never recorded: what a run's folder names is not
             started, loaded or connected to by itself.
+        finer: how many steps of the embedded simulator make one of the scenario's.
 
     Raises:
         UnknownNameError: no such simulator, or it has no such setting.
@@ -128,6 +129,7 @@ class SimulatorChoice:
     name: str = "embedded"
     settings: Mapping[str, Value] = field(default_factory=dict)
     access: Mapping[str, Value] = field(default_factory=dict)
+    finer: int = 1
 
     def __post_init__(self) -> None:
         if self.name not in SIMULATORS:

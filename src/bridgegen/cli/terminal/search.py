@@ -221,6 +221,8 @@ def conclusion(run: "Run") -> str:
 
 def _mode_lines(found: "Triage") -> list[str]:
     """Return a line for each failure mode: its bar, count, event, rule, severity and cause."""
+    from bridgegen.search.triage.words import step_in_words
+
     modes = found.modes[:MOST_MODES]
     most = max((mode.count for mode in modes), default=1)
     lines = ["         count  event · rule · worst MAIS3+ · root cause"] if modes else []
@@ -228,7 +230,8 @@ def _mode_lines(found: "Triage") -> list[str]:
         bar = "█" * max(round(BAR * mode.count / most), 1)
         what, _, _ = mode.title.partition(" (")
         worst = percent(mode.severity) if mode.conflict == "contact" else mode.conflict
-        about = " · ".join(filter(None, [mode.rule, worst, mode.cause]))
+        hangs = "depends on the time step" if step_in_words(mode, found) else ""
+        about = " · ".join(filter(None, [mode.rule, worst, mode.cause, hangs]))
         head = f"{mode.number:>2} {bar:<{BAR}} {mode.count:>5,}  "
         room = max(WIDTH - len(head) - len(about) - 3, 12)
         short = what if len(what) <= room else f"{what[: room - 1]}…"
@@ -269,7 +272,7 @@ def _print_rows(rows: list[tuple[str, str]]) -> None:
 
 def _print_modes(found: "Triage") -> None:
     """Print the failure modes, with their simplest scenarios."""
-    from bridgegen.search.triage.words import mode_in_words, parameters_in_words
+    from bridgegen.search.triage.words import mode_in_words, parameters_in_words, steps_in_words
 
     for mode in found.modes[:MOST_MODES]:
         print(mode_in_words(mode, found))
@@ -281,6 +284,8 @@ def _print_modes(found: "Triage") -> None:
         print(f"     and {more} more")
     if matter := parameters_in_words(found):
         print(f"what matters most: {matter}")
+    if steps := steps_in_words(found):
+        print(f"time step: {steps}")
 
 
 def _exported(run: "Run") -> str:

@@ -156,6 +156,9 @@ class Failures(Part):
             near = (
                 f"{word}: {self._n(f'still_harmful{k}')} of {self._n(f'neighbours{k}')} neighbours"
             )
+        check = self._facts.triage.step_check(mode.shown)
+        if check is not None and not check.stable:
+            near = f"{near}; its verdict depends on the time step"
         cause = f"; root cause: {mode.cause}" if mode.cause else ""
         draft = counter.add(
             "CounterGoal",

@@ -44,6 +44,7 @@ class Modes {
     if (nearest !== null && !anyViolated()) notes.push(`Evaluation ${number(nearest + 1)}, which came nearest to harm, is shown below.`);
     if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
     if (found.influences.length) notes.push(`What matters most: ${found.influences.slice(0, 3).map(({ name }) => name).join(", ")}.`);
+    if (found.steps) notes.push(`${capital(found.steps)}.`);
     if (found.more) notes.push(`${number(found.more)} more not shown.`);
     $("modes-note").textContent = notes.join(" ");
   }
@@ -68,6 +69,7 @@ class Modes {
       "div", { class: "mode-more", hidden: "" },
       element("ul", { class: "mode-facts" }, robust, ...share),
       ...(mode.knife_edge ? [element("p", { class: "mode-edge" }, "Knife-edge: fewer than half of its neighbours are harmful.")] : []),
+      ...(mode.step ? [element("p", { class: "mode-edge" }, `${capital(mode.step)}.`)] : []),
       this.cause(mode),
       element("p", { class: "mode-buttons" }, only),
       ...this.minimal(mode),
@@ -78,7 +80,7 @@ class Modes {
       fold.setAttribute("aria-expanded", `${!more.hidden}`);
     });
     return element(
-      "li", { class: `card mode${mode.knife_edge ? " edge" : ""}` },
+      "li", { class: `card mode${mode.knife_edge || mode.step ? " edge" : ""}` },
       element(
         "div", { class: "mode-head" },
         element("span", { class: "mode-number", "aria-hidden": "true" }, `${mode.number}`),

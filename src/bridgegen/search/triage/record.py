@@ -175,6 +175,70 @@ class Neighbourhood(_Model):
         return next(works, None)
 
 
+class AtStep(_Model):
+    """What becomes of an evaluation at a fraction of the time step.
+
+    Attributes:
+        steps: how many make one of the scenario's.
+        ok: whether it has a result, with plausible traffic.
+        harmful: whether it is a failure.
+        harm: 0 where there is no result.
+        severity: probability of MAIS3+ in the ego's collision.
+        time: of the decisive conflict [s]; None where there is none.
+        conflict: its kind; "" where there is none.
+    """
+
+    steps: Annotated[int, Field(ge=1, le=1000)]
+    ok: bool
+    harmful: bool
+    harm: Share
+    severity: Share
+    time: Number | None = None
+    conflict: Text = ""
+
+
+class StepCheck(_Model):
+    """An evaluation at the scenario's time step and at fractions of it.
+
+    Attributes:
+        evaluation: its number.
+        time_step: the scenario's [s].
+        at: the results, at the scenario's step first.
+    """
+
+    evaluation: Count
+    time_step: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    at: Annotated[tuple[AtStep, ...], Field(min_length=1, max_length=10)]
+
+    @property
+    def stable(self) -> bool:
+        """Whether verdict and kind of conflict are the same at each step."""
+        same = {(one.ok, one.harmful, one.conflict if one.harmful else "") for one in self.at}
+        return len(same) == 1
+
+    @property
+    def sentence(self) -> str:
+        """The check in words; "" where it shows nothing to be said."""
+        first, *finer = self.at
+        if self.stable or not finer:
+            return ""
+        other = next(
+            one
+            for one in finer
+            if (one.ok, one.harmful, one.conflict) != (first.ok, first.harmful, first.conflict)
+        )
+        return (
+            f"depends on the time step: {_kind(first)} at {self.time_step:g} s, {_kind(other)} at "
+            f"{self.time_step / other.steps:g} s"
+        )
+
+
+def _kind(one: AtStep) -> str:
+    if not one.ok:
+        return "no result"
+    return one.conflict or "no conflict"
+
+
 class Probes(_Model):
     """Scenarios that were simulated to check a statement.
 
@@ -426,6 +490,8 @@ class Triage(_Model):
         influences: the parameters that matter for failure significantly, the most important first.
         fresh: the fresh random rows; None where none were drawn, and in records of earlier
             versions.
+        step_checks: findings at fractions of the time step, then some evaluations without failure,
+            evenly spread over the run; empty where none were made.
     """
 
     schema_version: Literal[1] = 1
@@ -445,6 +511,7 @@ class Triage(_Model):
     untested: Text = ""
     influences: Annotated[tuple[Influence, ...], Field(max_length=1000)] = ()
     fresh: FreshRows | None = None
+    step_checks: Annotated[tuple[StepCheck, ...], Field(max_length=MOST_NEIGHBOURHOODS)] = ()
 
     @model_validator(mode="after")
     def _consistent(self) -> "Triage":
@@ -460,7 +527,7 @@ class Triage(_Model):
         if sum(mode.count for mode in self.modes) > self.bound.harmful:
             raise ValueError("modes must not hold more rows than are harmful")
         named = [i for mode in self.modes for i in (mode.worst, mode.shown, *mode.examples)]
-        named += [neighbourhood.evaluation for neighbourhood in self.neighbourhoods]
+        named += [item.evaluation for item in (*self.neighbourhoods, *self.step_checks)]
         # A record may be damaged or another's: readers index the store's rows by these numbers.
         if max(named, default=-1) >= self.bound.evaluations:
             raise ValueError(f"evaluation {max(named)} must be one of the run's")
@@ -470,6 +537,10 @@ class Triage(_Model):
         """Return the results of an evaluation's neighbours, if they were tested."""
         found = (item for item in self.neighbourhoods if item.evaluation == evaluation)
         return next(found, None)
+
+    def step_check(self, evaluation: int) -> StepCheck | None:
+        """Return the results of an evaluation at fractions of the time step, if it was checked."""
+        return next((item for item in self.step_checks if item.evaluation == evaluation), None)
 
     @property
     def robust(self) -> int:

@@ -52,8 +52,10 @@ from bridgegen.search.triage.record import (
     Minimal,
     Mode,
     Neighbourhood,
+    StepCheck,
     Triage,
 )
+from bridgegen.search.triage.time_steps import step_checks
 from bridgegen.search.triage.what_happened import COPY, apart, distinct, of_events, of_results
 
 _SAMPLE = 18  # stream of random numbers, apart from others of the same seed
@@ -154,6 +156,7 @@ class _Triage:
         self._U: Float = rows.U[self._at]
         self._found: dict[int, Neighbourhood] = {}
         self._as_is: AsIs = {}
+        self._steps: dict[int, StepCheck] = {}
         self._unrecorded = 0
         self._preventable: dict[int, bool | None] = {}
         self._event: Float = np.zeros((0, len(EVENT)))
@@ -230,7 +233,10 @@ class _Triage:
         every = by_harm(harm, U)
         several = distinct(events, every, self._effort.spare * max(self._keep, 1))
         self._simulate(dict.fromkeys(i for some in (*worst, several) for i in some), fixes=False)
-        return [min(some, key=lambda i: (self._is_knife_edge(i), some.index(i))) for some in worst]
+        while True:  # a next best one is checked only where the best depends on the time step
+            best = [min(some, key=lambda i: (*self._doubts(i), some.index(i))) for some in worst]
+            if not self._check_steps(best):
+                return best
 
     def _choose(self, shown: Sequence[int], U: Float, harm: Float) -> list[int]:
         """Return the rows to export, one of each mode and others: robust ones first, then harm."""
@@ -251,6 +257,8 @@ class _Triage:
             kept = [*first, *more]
             more += distinct(events, every[critical[every]], self._keep, kept)
             self._simulate([i for i in more if self._tests and i not in self._found], fixes=False)
+        if self._tests:
+            self._check_steps([*first, *more])
         return sorted([*first, *more], key=lambda i: self._rank(i, harm))
 
     def _sample(self, tested: Sequence[int]) -> list[int]:
@@ -281,12 +289,34 @@ class _Triage:
         )
         self._found |= dict(zip(at, results, strict=True))
 
-    def _is_knife_edge(self, i: int) -> bool:
-        return i in self._found and self._found[i].knife_edge
+    def _check_steps(self, at: Sequence[int]) -> bool:
+        """Simulate rows at fractions of the time step; return whether there were new ones."""
+        new = [i for i in dict.fromkeys(at) if i not in self._steps]
+        rows = self._at[np.array(new, dtype=np.int64)]
+        X, ids = self._rows.X[rows], self._rows.id[rows]
+        found = step_checks(self._pipeline, X, ids, self._effort.finer)
+        self._steps |= dict(zip(new, found, strict=True))
+        return bool(new)
+
+    def _unharmed(self) -> list[StepCheck]:
+        """Check rows without failure, evenly spread over the run."""
+        rows, rest = self._rows, np.ones(len(self._rows.id), np.bool_)
+        rest[self._at] = False
+        rest &= (rows.status == 0) & ~_implausible(rows)
+        some = np.flatnonzero(rest)
+        some = some[np.argsort(rows.id[some])]
+        n = min(len(some), self._effort.unharmed)
+        at = some[np.linspace(0, len(some) - 1, n).astype(np.int64)] if n else some[:0]
+        return step_checks(self._pipeline, rows.X[at], rows.id[at], self._effort.finer)
+
+    def _doubts(self, i: int) -> tuple[bool, bool]:
+        """Return whether a row's verdict depends on the time step, and whether it is knife-edge."""
+        hangs = i in self._steps and not self._steps[i].stable
+        return hangs, i in self._found and self._found[i].knife_edge
 
     def _rank(self, i: int, harm: Float) -> tuple[Any, ...]:
-        """Return the sort key of findings: robust ones first, then the worst."""
-        return self._is_knife_edge(i), -float(harm[i]), *self._U[i].tolist()
+        """Return the sort key of findings: stable and robust ones first, then the worst."""
+        return *self._doubts(i), -float(harm[i]), *self._U[i].tolist()
 
     def _by_tested_cause(
         self, groups: Sequence[Group], shown: Sequence[int], U: Float, harm: Float
@@ -430,6 +460,10 @@ class _Triage:
                 self._space, rows.X, np.isin(np.arange(len(ok)), self._at), ok & ~implausible
             ),
             untested=untested, fresh=fresh,
+            step_checks=tuple(
+                [self._steps[i] for i in dict.fromkeys([*shown, *exports]) if i in self._steps]
+                + (self._unharmed() if self._tests else [])
+            ),
         )  # fmt: skip
 
     def _avoids(self, at: Int) -> Bool:

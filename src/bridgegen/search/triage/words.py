@@ -21,6 +21,7 @@ def mode_in_words(mode: Mode, found: Triage) -> str:
     else:
         parts.append(f"harm {mode.harm:.2f}")
     parts.append(robustness_in_words(mode, found))
+    parts.append(step_in_words(mode, found))
     parts.append(mode.judgement or mode.cause)
     if mode.space.drawn and mode.space.share is not None:
         low, high = percent(mode.space.low), percent(mode.space.high)
@@ -35,6 +36,26 @@ def parameters_in_words(found: Triage) -> str:
     if text:
         text = f"{text}: distance of failures from other rows, 0 to 1"
     return "; ".join([*([text] if text else []), *(f"{end}: widen the range?" for end in ends[:1])])
+
+
+def step_in_words(mode: Mode, found: Triage) -> str:
+    """Return how the verdict on the evaluation that stands for a mode hangs on the time step."""
+    check = found.step_check(mode.shown)
+    return check.sentence if check else ""
+
+
+def steps_in_words(found: Triage) -> str:
+    """Return how many verdicts are the same at fractions of the time step; "" if unchecked."""
+    checks = found.step_checks
+    if not checks:
+        return ""
+    parts = []
+    for fails, what in ((True, "findings"), (False, "evaluations without failure")):
+        some = [check for check in checks if check.at[0].harmful is fails]
+        same = sum(check.stable for check in some)
+        parts += [f"{same} of {len(some)} {what} keep their verdict"] if some else []
+    steps = [f"{checks[0].time_step / one.steps:g}" for one in checks[0].at]
+    return f"{', '.join(parts)} at time steps of {', '.join(steps)} s"
 
 
 def shortly(mode: Mode) -> str:
