@@ -6,7 +6,7 @@ Nothing here knows metrics, objectives or workers; `bridgegen.engine.pipeline` a
 from collections.abc import Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -185,11 +185,16 @@ class Runner:
 
     def _take_storyboard(self, nominal: ConcreteScenario) -> None:
         """Make the simulators ready for the storyboard of a concrete scenario."""
-        name, given = self.scenario.name, {"driver": self._given_driver, "vehicle": self._vehicle}
-        self.embedded = EmbeddedSimulator(nominal.storyboard, name, **given)
+        make = partial(
+            EmbeddedSimulator,
+            nominal.storyboard,
+            self.scenario.name,
+            driver=self._given_driver,
+            vehicle=self._vehicle,
+        )
+        self.embedded = make()
         if (finer := self._choice.finer) > 1:
-            step = self.embedded.time_step / finer
-            self.embedded = EmbeddedSimulator(nominal.storyboard, name, time_step=step, **given)
+            self.embedded = make(time_step=self.embedded.time_step / finer)
         self.simulator: Simulator[Any] = self._choice.around(self.embedded, nominal.storyboard)
 
     def _static_roads(self, nominal: ConcreteScenario) -> Any:

@@ -527,7 +527,8 @@ class Triage(_Model):
         if sum(mode.count for mode in self.modes) > self.bound.harmful:
             raise ValueError("modes must not hold more rows than are harmful")
         named = [i for mode in self.modes for i in (mode.worst, mode.shown, *mode.examples)]
-        named += [item.evaluation for item in (*self.neighbourhoods, *self.step_checks)]
+        named += [neighbourhood.evaluation for neighbourhood in self.neighbourhoods]
+        named += [check.evaluation for check in self.step_checks]
         # A record may be damaged or another's: readers index the store's rows by these numbers.
         if max(named, default=-1) >= self.bound.evaluations:
             raise ValueError(f"evaluation {max(named)} must be one of the run's")
