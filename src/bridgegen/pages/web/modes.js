@@ -30,7 +30,7 @@ class Modes {
     const found = data.triage;
     const n = found.modes.length + found.more;
     $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails${found.baseline ? ` and ${found.baseline} does not` : ""}` : found.bound.failures ? `${capital(found.ego)} fails in fresh random draws alone` : found.bound.judged === false ? "Not judged" : data.criteria ? "No harm found" : "No failure found";
-    $("modes-lead").textContent = capital(found.bound.sentence.replace(n ? /^[^:]*: / : /^(Not judged: |No (failure found|scenario in which .*? was found) in )/, "")); // the title says the rest
+    $("modes-lead").textContent = capital(found.bound.sentence.replace(n ? /^.*? fails in [\d,]+ ways?: / : /^(Not judged: |No (failure found|scenario in which .*? was found) in )/, "")); // the title says the rest
     const kind = n || found.bound.failures ? "fails" : found.bound.judged === false ? "open" : data.criteria ? "" : "passes";
     // Not green where careful drivers avoid collisions that do not count: the sentence says so after "but".
     $("verdict").className = `banner ${kind === "passes" && found.bound.sentence.includes(", but ") ? "open" : kind}`;
