@@ -185,8 +185,8 @@ def verdict_lines(run: "Run", seconds: float) -> list[str]:
     if run.scenarios or run.fresh_scenarios:
         kept = folder if run.scenarios else run.fresh_scenarios[0]
         lines.append(
-            f"Keep: bridgegen suite add {kept} --to SUITE · compare drivers: bridgegen diff "
-            f"SUITE --ego {settings.ego} --ego OTHER"
+            f"Keep: {settings.keep_command(kept)} · compare drivers: bridgegen diff SUITE "
+            f"--ego {settings.ego} --ego OTHER"
         )
     return lines
 

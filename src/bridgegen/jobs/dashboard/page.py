@@ -13,7 +13,7 @@ from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
 from bridgegen.jobs.dashboard.odd import Coverage, Covered
 from bridgegen.jobs.dashboard.requirements import Matrix, statements
-from bridgegen.jobs.dashboard.results import Result, driver_of, versions
+from bridgegen.jobs.dashboard.results import Result, versions
 from bridgegen.jobs.dashboard.results_of import SuiteLine
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
 from bridgegen.jobs.dashboard.taxonomy import SOURCE
@@ -84,7 +84,7 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         problems=found.project.problems,
         verdict=banner(found),
         file=FILE,
-        verdicts=_verdicts(found, base),
+        verdicts=verdicts_table(found, base),
         histories=_histories(found),
         notes=found.notes[:MOST_RESULTS],
         modes=modes_table("Failure modes of current results", found.failing, base),
@@ -205,8 +205,11 @@ _MARKS: dict[Verdict, tuple[str, str]] = {
 }
 
 
-def _verdicts(found: Dashboard, base: str) -> dict[str, Any]:
-    """Return the matrix of scenarios and drivers, with pictures of the gravest failures."""
+def verdicts_table(found: Dashboard, base: str) -> dict[str, Any]:
+    """Return the matrix of scenarios and drivers, with pictures of the gravest failures.
+
+    Its links begin with ``base``.
+    """
     stands = standings(found.project.results, found.failing)
     failures = {key: len(standing.modes) for key, standing in stands.items()}
 
@@ -271,10 +274,7 @@ def _picture_of(found: Dashboard, standing: Standing) -> Thumbnail | None:
     folder = found.project.folder
     for result in standing.modes[0].results[:MOST_RESULTS]:
         for picture in read_thumbnails(folder / result.source):
-            is_ego = not picture.ego or driver_of(picture.ego, folder, "").label == (
-                result.driver.label
-            )
-            if picture.entry == result.entry and is_ego:
+            if (picture.entry, picture.ego) == (result.entry, result.ego):
                 return picture
     return None
 
