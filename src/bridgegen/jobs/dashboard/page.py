@@ -1,6 +1,7 @@
 """The dashboard's page: failure modes, requirements, trends; one file without scripts."""
 
 import os
+import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import accumulate, groupby
@@ -82,7 +83,7 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         generator=GENERATOR,
         facts=[*_facts(found)],
         problems=found.project.problems,
-        verdict=banner(found),
+        verdict=banner(found) if served else replace(banner(found), command=_next(found)),
         file=FILE,
         verdicts=verdicts_table(found, base),
         histories=_histories(found),
@@ -132,6 +133,11 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         open=OPEN,
         **served,
     )
+
+
+def _next(found: Dashboard) -> str:
+    """Return the command that plays what fails, and sets its status."""
+    return shlex.join(["bridgegen", "open", str(found.project.folder)]) if found.failing else ""
 
 
 def banner(found: Dashboard) -> Banner:
