@@ -23,10 +23,20 @@ def opened(show, report) -> Iterator[Any]:
 
 def test_what_is_printed_has_every_chart(show, report):
     opened = show(report)
-    assert opened.page.evaluate("bridgegen.chartsDrawn < bridgegen.charts")
+    opened.page.wait_for_function("bridgegen.chartsDrawn >= bridgegen.charts")
+    opened.page.evaluate("document.dispatchEvent(new Event('theme'))")  # to be drawn anew
+    drawn = opened.page.evaluate("bridgegen.chartsDrawn")
     assert opened.page.pdf().startswith(b"%PDF")
-    assert opened.page.evaluate("bridgegen.chartsDrawn >= bridgegen.charts")
+    assert opened.page.evaluate("bridgegen.chartsDrawn") >= drawn + 2  # those out of sight
     assert opened.complaints == []
+    opened.page.close()
+
+
+def test_a_picture_of_the_whole_page_has_every_chart(show, report):
+    """Nothing is scrolled to: what is out of sight is drawn when the page is idle."""
+    opened = show(report)
+    opened.page.wait_for_function("bridgegen.chartsDrawn >= bridgegen.charts")
+    assert opened.page.evaluate("scrollY") == 0
     opened.page.close()
 
 

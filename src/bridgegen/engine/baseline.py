@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridgegen.assess.criteria.measured import OF_BASELINE
+from bridgegen.assess.metrics import OF_BASELINE
 from bridgegen.base.arrays import Bool
 from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.trials import Trials

@@ -21,8 +21,9 @@ from bridgegen.assess.conflict.findings import Findings
 from bridgegen.assess.conflict.happening import happened
 from bridgegen.assess.conflict.harm import Count
 from bridgegen.assess.conflict.plausibility import Implausible, plausibility
-from bridgegen.assess.criteria import OF_BASELINE, Monitor, quantity
+from bridgegen.assess.criteria import Monitor, quantity
 from bridgegen.assess.criteria import evaluate as measure
+from bridgegen.assess.metrics import OF_BASELINE
 from bridgegen.assess.objective import CLASSIFYING, Objective, Objectives, needs_sample
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import InputError, UnknownNameError

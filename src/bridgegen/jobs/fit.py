@@ -81,7 +81,7 @@ def write_fit(
         progress=progress,
     )
     write_exposure(out, made.text)
-    write_page(page, made)
+    write_page(page, made, out)
     if xosc is None:
         return made, (out, page)
     date = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S")

@@ -10,6 +10,9 @@ from bridgegen.pages.charts import Plot
 from bridgegen.scenario.exposure.fit import Fit, ParameterFit
 
 GENERATOR = "BridgeGen fit"
+DOUBTFUL = 0.05
+"""Share of samples of a form below which events as far from it refute it."""
+
 _DOTS = 200
 """Largest number of points of a quantile plot: more would hide each other."""
 
@@ -23,19 +26,26 @@ def refuse_other_page(path: Path) -> None:
     refuse_other(path, GENERATOR, "page of a fit")
 
 
-def write_page(path: Path, fit: Fit) -> None:
+def write_page(path: Path, fit: Fit, exposure: Path | None = None) -> None:
     """Write the page of a fit.
+
+    Args:
+        path: of the page.
+        fit: it.
+        exposure: its file, if it is written.
 
     Raises:
         StorageError: something else is there, or it cannot be written.
     """
     refuse_other_page(path)
+    _, *facts = fit.facts()
     templates.write_page(
         path,
         "pages/web/exposure.html",
         title=f"Exposure of {fit.exposure.scenario.name}",
         generator=GENERATOR,
-        facts=[*fit.facts()],
+        verdict=_banner(fit, exposure),
+        facts=facts,
         remarks=fit.remarks(),
         samples=len(fit.replicates),
         forms=[_form(parameter) for parameter in fit.parameters.values()],
@@ -44,6 +54,24 @@ def write_page(path: Path, fit: Fit) -> None:
         correlation=fit.correlation.tolist(),
         band=fit.correlation_band.tolist(),
     )
+
+
+def _banner(fit: Fit, exposure: Path | None) -> templates.Banner:
+    """Return what was fitted, whether the forms hold, and what uses it."""
+    first = next(fit.facts())
+    tested = [one for one in fit.parameters.values() if not np.isnan(one.p)]
+    doubtful = [one.name for one in tested if one.p < DOUBTFUL]
+    text = f"of {fit.exposure.scenario.name}"
+    if doubtful:
+        text += f"; the form of {', '.join(doubtful)} is doubtful (p below {DOUBTFUL:g})"
+    elif tested:
+        text += f"; no form is refuted (least p {min(one.p for one in tested):.2f})"
+    if fit.outside or fit.infeasible:
+        text += "; some events lie outside the scenario, see below"
+    name = fit.exposure.scenario.name
+    command = "" if exposure is None else f"bridgegen risk {name} --exposure {exposure}"
+    kind = "open" if doubtful or fit.outside or fit.infeasible else ""
+    return templates.Banner(f"{text}.", kind, first.upper(), command)
 
 
 def _form(parameter_fit: ParameterFit) -> list[str]:

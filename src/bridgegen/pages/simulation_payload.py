@@ -21,8 +21,15 @@ from bridgegen.assess.conflict.plausibility import (
     window_of,
 )
 from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
-from bridgegen.assess.criteria import OF_BASELINE
-from bridgegen.assess.metrics import braking, distances, impact, perception, road, times
+from bridgegen.assess.metrics import (
+    OF_BASELINE,
+    braking,
+    distances,
+    impact,
+    perception,
+    road,
+    times,
+)
 from bridgegen.assess.metrics.metric import in_steps
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError

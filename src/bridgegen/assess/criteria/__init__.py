@@ -1,6 +1,6 @@
 """Pass criteria applied to rollouts: signals, margins, and what of them a search records."""
 
-from bridgegen.assess.criteria.measured import OF_BASELINE, evaluate, quantity
+from bridgegen.assess.criteria.measured import evaluate, quantity
 from bridgegen.assess.criteria.monitor import CriterionResult, Monitor, margin_in_words, unit_of
 from bridgegen.assess.criteria.signals import SIGNALS, Signal
 from bridgegen.assess.criteria.summary import (
@@ -11,7 +11,6 @@ from bridgegen.assess.criteria.summary import (
 )
 
 __all__ = [
-    "OF_BASELINE",
     "SIGNALS",
     "CriterionResult",
     "CriterionSummary",

@@ -6,13 +6,10 @@ import numpy as np
 
 from bridgegen.assess.conflict import quantities
 from bridgegen.assess.criteria.monitor import LARGEST, Monitor
-from bridgegen.assess.metrics import Quantity
+from bridgegen.assess.metrics import OF_BASELINE, Quantity
 from bridgegen.base.arrays import Float
 from bridgegen.scenario.language.criteria import PREFIX
 from bridgegen.simulation.rollout import Rollout
-
-OF_BASELINE = "baseline:"
-"""Prefix of the name of a quantity of the same scenario with the baseline's driver."""
 
 
 def quantity(name: str) -> Quantity:

@@ -6,6 +6,7 @@
 from bridgegen.assess.metrics.metric import Metric, Need, Quantity
 from bridgegen.assess.metrics.registry import (
     METRICS,
+    OF_BASELINE,
     TABLE_I,
     about,
     evaluate,
@@ -20,6 +21,7 @@ from bridgegen.assess.metrics.registry import (
 
 __all__ = [
     "METRICS",
+    "OF_BASELINE",
     "TABLE_I",
     "Metric",
     "Need",

@@ -110,6 +110,9 @@ METRICS: Mapping[str, Metric] = Registry(_OURS, ADDED, _checked)
 """Metrics by name: those of the paper's Table I, then ours beyond it, then those of installed
 packages."""
 
+OF_BASELINE = "baseline:"
+"""Prefix of the name of a quantity of the same scenario with the baseline's driver."""
+
 _NAMED: set[str] = set()
 """Names of the metrics that were read from files and modules of the user."""
 
@@ -126,7 +129,7 @@ def read(names: Iterable[str]) -> tuple[str, ...]:
     """
     found: dict[str, str] = {}
     for name in names:
-        if not is_own(name):
+        if not is_own(name) or name.startswith(OF_BASELINE):
             found.setdefault(name, name)
             continue
         metric = object_of(name, "--metrics", Metric, "Metric")

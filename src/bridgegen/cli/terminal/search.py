@@ -185,8 +185,8 @@ def verdict_lines(run: "Run", seconds: float) -> list[str]:
     if run.scenarios or run.fresh_scenarios:
         kept = folder if run.scenarios else run.fresh_scenarios[0]
         lines.append(
-            f"Keep: bridgegen suite add {kept} --to SUITE · compare drivers: bridgegen diff "
-            f"SUITE --ego {settings.ego} --ego OTHER"
+            f"Keep: {settings.keep_command(kept)} · compare drivers: bridgegen diff SUITE "
+            f"--ego {settings.ego} --ego OTHER"
         )
     return lines
 
@@ -230,7 +230,7 @@ def _mode_lines(found: "Triage") -> list[str]:
         bar = "█" * max(round(BAR * mode.count / most), 1)
         what, _, _ = mode.title.partition(" (")
         worst = percent(mode.severity) if mode.conflict == "contact" else mode.conflict
-        hangs = "depends on the time step" if step_in_words(mode, found) else ""
+        hangs = "step-dependent" if step_in_words(mode, found) else ""
         about = " · ".join(filter(None, [mode.rule, worst, mode.cause, hangs]))
         head = f"{mode.number:>2} {bar:<{BAR}} {mode.count:>5,}  "
         room = max(WIDTH - len(head) - len(about) - 3, 12)

@@ -18,7 +18,7 @@ from bridgegen.base.disk import read_inside
 from bridgegen.base.errors import BridgeGenError, StorageError
 from bridgegen.jobs.dashboard.dashboard import PAGE, Dashboard, dashboard_of
 from bridgegen.jobs.dashboard.modes import OpenMode, cleaned
-from bridgegen.jobs.dashboard.page import banner, modes_table, page_of
+from bridgegen.jobs.dashboard.page import banner, modes_table, page_of, verdicts_table
 from bridgegen.jobs.dashboard.project import Project, kind_of, read_project
 from bridgegen.jobs.dashboard.results_of import key_of
 from bridgegen.jobs.search.run import REPORT
@@ -176,6 +176,7 @@ class Home(FolderView):
             title=self.folder.name or "project",
             home="./",
             verdict=banner(found) if found else Banner(""),
+            verdicts=verdicts_table(found, "p") if found else None,
             modes=modes_table("Failing now", found.failing[:MOST_MODES], "p") if found else None,
             more=max(0, len(found.failing) - MOST_MODES) if found else 0,
             file=FILE,

@@ -1,6 +1,7 @@
 """The dashboard's page: failure modes, requirements, trends; one file without scripts."""
 
 import os
+import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import accumulate, groupby
@@ -13,7 +14,7 @@ from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
 from bridgegen.jobs.dashboard.odd import Coverage, Covered
 from bridgegen.jobs.dashboard.requirements import Matrix, statements
-from bridgegen.jobs.dashboard.results import Result, driver_of, versions
+from bridgegen.jobs.dashboard.results import Result, versions
 from bridgegen.jobs.dashboard.results_of import SuiteLine
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
 from bridgegen.jobs.dashboard.taxonomy import SOURCE
@@ -82,9 +83,9 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         generator=GENERATOR,
         facts=[*_facts(found)],
         problems=found.project.problems,
-        verdict=banner(found),
+        verdict=banner(found) if served else replace(banner(found), command=_next(found)),
         file=FILE,
-        verdicts=_verdicts(found, base),
+        verdicts=verdicts_table(found, base),
         histories=_histories(found),
         notes=found.notes[:MOST_RESULTS],
         modes=modes_table("Failure modes of current results", found.failing, base),
@@ -132,6 +133,11 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         open=OPEN,
         **served,
     )
+
+
+def _next(found: Dashboard) -> str:
+    """Return the command that plays what fails, and sets its status."""
+    return shlex.join(["bridgegen", "open", str(found.project.folder)]) if found.failing else ""
 
 
 def banner(found: Dashboard) -> Banner:
@@ -205,8 +211,11 @@ _MARKS: dict[Verdict, tuple[str, str]] = {
 }
 
 
-def _verdicts(found: Dashboard, base: str) -> dict[str, Any]:
-    """Return the matrix of scenarios and drivers, with pictures of the gravest failures."""
+def verdicts_table(found: Dashboard, base: str) -> dict[str, Any]:
+    """Return the matrix of scenarios and drivers, with pictures of the gravest failures.
+
+    Its links begin with ``base``.
+    """
     stands = standings(found.project.results, found.failing)
     failures = {key: len(standing.modes) for key, standing in stands.items()}
 
@@ -271,10 +280,7 @@ def _picture_of(found: Dashboard, standing: Standing) -> Thumbnail | None:
     folder = found.project.folder
     for result in standing.modes[0].results[:MOST_RESULTS]:
         for picture in read_thumbnails(folder / result.source):
-            is_ego = not picture.ego or driver_of(picture.ego, folder, "").label == (
-                result.driver.label
-            )
-            if picture.entry == result.entry and is_ego:
+            if (picture.entry, picture.ego) == (result.entry, result.ego):
                 return picture
     return None
 

@@ -250,6 +250,7 @@ class Result:
         judged: its requirements.
         seen: which values were evaluated; None where the scenario cannot be read any more.
         entry: of the suite, by name.
+        ego: the driver of the entry, as the suite records it.
         worse_than: the driver that a difference is of, as people call it; else "".
         unjudged: whether it says nothing of the driver, see
             `bridgegen.search.triage.record.Bound.judged`.
@@ -270,6 +271,7 @@ class Result:
     judged: tuple[Judged, ...] = ()
     seen: Seen | None = field(default=None, repr=False, compare=False)
     entry: str = ""
+    ego: str = ""
     worse_than: str = ""
     unjudged: bool = False
 

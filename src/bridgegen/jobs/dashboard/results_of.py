@@ -295,6 +295,7 @@ def _result(
         unjudged=entry_result.verdict == "not judged",
         seen=_seen_in_entry(entry_result, _scenery(project, entry_result, sceneries)),
         entry=entry_result.entry,
+        ego=entry_result.ego or entry_result.driver,
     )
 
 

@@ -49,9 +49,7 @@ def page(case: SafetyCase, data: bytes) -> bytes:
         "jobs/safety_case/page.html",
         title=f"Safety case: {case.title}",
         case=case,
-        verdict=templates.Banner(
-            f"{top.id}: {top.statement.text}", _BANNERS.get(top.status, "open"), top.status.upper()
-        ),
+        verdict=_banner(case, top),
         drawn=drawn,
         elements=[(element, _relations(case, element)) for element in case.elements],
         files={evidence.id: evidence for evidence in case.evidence},
@@ -61,6 +59,20 @@ def page(case: SafetyCase, data: bytes) -> bytes:
         file=FILE,
         digest=hashlib.sha256(data).hexdigest(),
     )
+
+
+def _banner(case: SafetyCase, top: Element) -> templates.Banner:
+    """Return what the case claims; where that does not hold, what speaks against it."""
+    text = f"{top.id}: {top.statement.text}"
+    refuted = [one for one in case.elements if one.status == "not supported"]
+    ids = [one.id for one in refuted]
+    # A goal's id begins with that of the goal above it: the lowest ones say why.
+    first = [one for one in refuted if not any(id.startswith(f"{one.id}.") for id in ids)]
+    if first:
+        more = f", and {len(first) - 1} more" if len(first) > 1 else ""
+        text = f"What does not hold is {first[0].id}: {first[0].statement.text.rstrip('.')}{more}."
+    kind = _BANNERS.get(top.status, "open")
+    return templates.Banner(text, kind, top.status.upper(), "python recompute.py")
 
 
 def _drawn(case: SafetyCase, goal: Element, label: str, *, deep: bool = True) -> str:

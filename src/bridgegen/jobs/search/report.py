@@ -203,7 +203,7 @@ def run_data(
         algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
         command=settings.command(folder), finished=run.finished,
         version=run.version, notes=run.notes, view=view_command(folder),
-        keep=shlex.join(["bridgegen", "suite", "add", str(folder)]) + " --to SUITE",
+        keep=settings.keep_command(folder),
         simulated=(settings.simulated(), settings.simulated(driver=False)),
         regions=read_record(folder / JSON_FILE),
         confirmations=read_records(folder, rows.X, rows.metrics), coverage=coverage,

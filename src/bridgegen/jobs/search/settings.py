@@ -9,7 +9,7 @@ from typing import Any, Self, get_type_hints
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from bridgegen.base.errors import InputError, StorageError
-from bridgegen.drivers import STORYBOARD
+from bridgegen.drivers import STORYBOARD, is_spec
 from bridgegen.engine.options import SearchOptions, options_of, range_problems
 from bridgegen.engine.options.option import ALWAYS
 from bridgegen.jobs.search.scenarios import PAPER, is_file
@@ -146,6 +146,12 @@ class Settings(SearchOptions):
             if option.name != "ego" or self.ego != STORYBOARD.name:
                 words += option.words(getattr(self, option.name))
         return shlex.join([*words, "--out", str(folder)])
+
+    def keep_command(self, folder: Path) -> str:
+        """Return the command line that keeps the run's failures in a suite."""
+        # What only a run's file names is not run: code must be named again.
+        named = ["--ego", self.ego] if is_spec(self.ego) else []
+        return f"{shlex.join(['bridgegen', 'suite', 'add', str(folder), *named])} --to SUITE"
 
     def simulated(self, driver: bool = True) -> str:
         """Return the command line that simulates a row of the run, without its values.

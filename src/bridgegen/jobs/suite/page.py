@@ -117,16 +117,27 @@ def _write(
     pictures = [picture_payload(map_, suite.folder) for map_ in maps]
     data = payload(suite, played, commands, searches=searches, maps=pictures, code=code_of(_MODULE))
     path = suite.folder / FILE
-    title = f"{suite.folder.resolve().name}: suite"
-    banner = _banner(suite, data["suite"])
+    name, is_diff = suite.folder.resolve().name, bool(data["suite"]["changed"])
+    banner = _banner(suite, data["suite"], commands)
+    heading = data["suite"]["changed"]["headline"].rpartition(": ")[0] if is_diff else name
+    trail = ["diff", name] if is_diff else ["suite"]
     write_page(
-        path, _MODULE, title, script_json(data), verdict=banner, heading=suite.folder.resolve().name
+        path,
+        _MODULE,
+        f"{name}: {trail[0]}",
+        script_json(data),
+        verdict=banner,
+        heading=heading,
+        trail=trail,
     )
     return path
 
 
-def _banner(suite: SuiteRun, page: Mapping[str, Any]) -> Banner:
-    """Return the verdict on all egos; of two, on the second, and what it fixes and breaks."""
+def _banner(suite: SuiteRun, page: Mapping[str, Any], commands: Mapping[Key, str]) -> Banner:
+    """Return the verdict on all egos; of two, on the second, and what it fixes and breaks.
+
+    Its command plays the most severe failure.
+    """
     egos = suite.egos[-1:] if page["changed"] else suite.egos
     verdicts = {result.verdict for ego in egos for result in suite.of_ego(ego)}
     kind, word = "passes", "PASSES"
@@ -134,8 +145,11 @@ def _banner(suite: SuiteRun, page: Mapping[str, Any]) -> Banner:
         kind, word = "fails", "FAILS"
     elif verdicts != {"passed"}:
         kind, word = "open", "NOT JUDGED"
-    said = page["changed"]["headline"] if page["changed"] else "; ".join(page["headlines"])
-    return Banner(f"{said}.", kind, word)
+    said = "; ".join(page["headlines"])
+    if page["changed"]:  # the heading says who against whom
+        said = page["changed"]["headline"].rpartition(": ")[2].capitalize()
+    worst = [key_of(result) for result in _failed(suite) if result.ego in (*egos, "", None)]
+    return Banner(f"{said}.", kind, word, next((commands[k] for k in worst if k in commands), ""))
 
 
 def command_of(folder: Path, job: Job, result: EntryResult) -> str:

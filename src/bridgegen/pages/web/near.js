@@ -1,4 +1,4 @@
-// Charts are drawn when they come near the screen, and anew, after something has changed, when they are near it.
+// Charts are drawn when they come near the screen, else when the page is idle; and anew, after something has changed, when they are near it.
 
 import { hook } from "./hook.js";
 
@@ -16,8 +16,21 @@ class NearScreen {
     addEventListener("beforeprint", () => {
       for (const plot of [...this.stale]) this.draw(plot); // paper shows what no screen has shown
     });
+    // A picture of the whole page is taken without scrolling.
+    addEventListener("load", () => this.rest());
     document.addEventListener("theme", () => this.all());
     document.addEventListener("grown", () => this.all());
+  }
+
+  // Draws what is left, one at a time.
+  rest() {
+    const left = [...this.stale], idle = window.requestIdleCallback ?? ((then) => setTimeout(then, 200));
+    const next = () => {
+      const plot = left.pop();
+      if (plot && this.stale.has(plot)) this.draw(plot);
+      if (left.length) idle(next);
+    };
+    idle(next);
   }
 
   add(plot, draw) {

@@ -130,7 +130,7 @@ class Fit:
             for unit, rate in (("h", encounters.per_hour), ("km", encounters.per_km)):
                 if rate is not None:
                     yield rate.in_words(unit)
-        yield f"{self.exposure.feasible_share.estimate:.2%} keep the constraints"
+        yield f"{percent(self.exposure.feasible_share.estimate)} keep the constraints"
         yield f"seed {self.seed}"
         if self.exposure.weighed:
             yield f"{percent(LEAST_ROWS / (self.used + LEAST_ROWS))} of it is the prior"
@@ -623,8 +623,9 @@ def _notes(
     if share.estimate < 0.95:
         rule, rejected = next(iter(share.rejected.items()))
         notes.append(
-            f"{1.0 - share.estimate:.1%} of the fitted distribution break a constraint and are cut "
-            f"off, most by '{rule}' ({rejected:.1%}): the constraints deform what was fitted"
+            f"{percent(1.0 - share.estimate)} of the fitted distribution break a constraint and "
+            f"are cut off, most by '{rule}' ({percent(rejected)}): the constraints deform what was "
+            "fitted"
         )
     for name, values in columns.items():
         names = scenario.parameters[name].kind.names

@@ -12,7 +12,7 @@ from bridgegen.assess.conflict.findings import Findings
 from bridgegen.assess.conflict.happening import Happening
 from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.assess.conflict.quantities import HARM
-from bridgegen.assess.criteria import OF_BASELINE
+from bridgegen.assess.metrics import OF_BASELINE
 from bridgegen.base.arrays import Bool, Float, Int, Numbers
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.trials import EVENT
