@@ -409,7 +409,7 @@ def test_the_page_begins_with_the_verdict(tmp_path, outcomes, kind):
     assert banner[0] == kind
     if len(outcomes) == 2:
         words = "fixes 1, breaks 0" if outcomes["a"] is HIT else "fixes 0, breaks 1"
-        assert banner[1] == f"b against a: {words}, 0 worse, 0 milder of 1 variation."
+        assert banner[1] == f"{words.capitalize()}, 0 worse, 0 milder of 1 variation."
 
 
 def test_hostile_texts_stay_texts(tmp_path):
