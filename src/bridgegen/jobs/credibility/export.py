@@ -231,7 +231,7 @@ def _filled(asked: Asked, numbers: dict[str, Number], answers: Mapping[str, str]
             status="stated" if answer else "yours",
         )
     needs = tuple(f"{EVERY}.{name}" for name in asked.needs)
-    if not asked.claim or any(name not in numbers for name in needs):
+    if any(name not in numbers for name in needs):
         claim = Statement(text=asked.gap)
         return Item(**common, claim=claim, again=asked.fill, needs=needs, status="gap")
     return Item(

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from importlib.metadata import distributions
+from itertools import groupby
 from statistics import median
 
 import numpy as np
@@ -148,7 +149,10 @@ def flips(runs: Mapping[str, Facts]) -> list[Flip]:
             run=name,
             evaluation=check.evaluation + 1,
             is_finding=check.at[0].harmful,
-            text="; ".join(f"{check.time_step / one.steps:g} s: {_words(one)}" for one in check.at),
+            text="; ".join(
+                f"{check.time_step / next(some).steps:g} s: {words}"
+                for words, some in groupby(check.at, _words)
+            ),
         )
         for name, facts in runs.items()
         for check in facts.triage.step_checks

@@ -50,8 +50,8 @@ class Asked:
         claim: template; of an item for people, the question.
         how: it is measured.
         again: the command that measures it anew.
-        needs: names of numbers of all runs without which it is a gap.
-        gap: what is missing then; always, without a claim.
+        needs: names of numbers of all runs without which it is a gap; some, nothing measures yet.
+        gap: what is missing then.
         fill: the command that fills the gap.
         note: why it is filled in part only.
         form: key of ``yours.yaml``, of an item for people.
@@ -104,7 +104,7 @@ def _error(number: str, quantity: str, title: str, unit: str) -> Asked:
         f"{unit}, of {of('series')} findings. Extrapolated to a step of 0: median "
         f"{of('extrapolated_median')}{unit}, 95 % quantile {of('extrapolated_q95')}{unit}; grid "
         f"convergence index, 95 % quantile {of('gci_q95')}{unit}.",
-        how=_ERROR,
+        how=_ERROR if quantity == "time" else "As 6.3.",
         again=_AGAIN,
         needs=(f"error_q95:{quantity}",),
         gap="No finding has results at the time step and at its half, quarter and eighth",
@@ -124,8 +124,8 @@ def _steps(number: str, kind: str, title: str, noun: str, how: str) -> Asked:
         number,
         title,
         f"{{all.{kind}_stable}} of {{all.{kind}}} {noun} keep verdict and kind of conflict at each "
-        f"fraction of the time step. Of {{all.{kind}_flips}} one or both differ: 95 % interval of "
-        f"the share {{all.{kind}_flips_low}} to {{all.{kind}_flips_high}}.",
+        f"fraction of the time step, {{all.{kind}_flips}} do not: 95 % interval of their share "
+        f"{{all.{kind}_flips_low}} to {{all.{kind}_flips_high}}.",
         how=how,
         again=_AGAIN,
         needs=(f"{kind}_flips",),
@@ -193,7 +193,7 @@ ASKED: tuple[Asked, ...] = (
           again="pytest TEST, in the source", sources=(*COMMON, "26262"),
           note="tests are in the source and not in the package: this command does not run them",
           details=[f"{what} ({test})" for what, test in ORACLES]),
-    Asked("5.3", "Mutation score and coverage", sources=("26262", *COMMON),
+    Asked("5.3", "Mutation score and coverage", sources=("26262", *COMMON), needs=("mutants",),
           gap="No installed package measures mutation score and coverage of its tests"),
     _steps("6.1", "findings", "Findings at finer steps", "findings",
            "The worst of each failure mode and each exported scenario, at the scenario's step, its "
@@ -217,8 +217,8 @@ ASKED: tuple[Asked, ...] = (
           "not known", fill=SENSITIVITY),
     Asked("8.1", "Other simulators", "Exported scenarios, simulated again elsewhere.", how=_CHOSEN,
           again=_CONFIRM, needs=("confirmed:1",), gap=_UNCONFIRMED, fill=_CONFIRM),
-    Asked("8.2", "Recordings", gap="Recorded events are not replayed beside their parameterised "
-          "twins; no command of this version does so"),
+    Asked("8.2", "Recordings", needs=("recorded",), gap="Recorded events are not replayed beside "
+          "their parameterised twins; no command of this version does so"),
     Asked("8.3", "Proving ground", "Which results of a proving ground or of road tests were "
           "compared, by which measure and threshold?", form="proving_ground"),
     Asked("9.1", "Sampling", "The harmful share of each searched space, with its interval.",
@@ -238,8 +238,8 @@ ASKED: tuple[Asked, ...] = (
           how="As 6.1 and 6.2.", again=_AGAIN, needs=("findings_flips", "sample_flips"),
           gap="Findings, or a sample of the others, were not simulated at finer steps",
           fill=_FULL),
-    Asked("9.5", "Parameterisation", gap="What the parameters of a scenario leave out of what was "
-          "recorded is not measured; no command of this version does so"),
+    Asked("9.5", "Parameterisation", needs=("twins",), gap="What the parameters of a scenario "
+          "leave out of what was recorded is not measured; no command of this version does so"),
     Asked("9.6", "Combined: sampling and time step", "Upper bounds of the harmful share at a finer "
           "time step.", again=RECOMPUTE, needs=("combined",), fill=_RANDOM,
           how="high + (1 − high) · f: high is the upper end of 9.1, f that of the share of "

@@ -16,7 +16,7 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
 from pathlib import Path
-from statistics import median
+from statistics import median, quantiles
 from typing import Any
 
 ROUND = {"percent": ROUND_HALF_EVEN, "percent_up": ROUND_CEILING, "percent_down": ROUND_FLOOR}
@@ -127,13 +127,6 @@ def errors(at: list[dict[str, Any]], of: str) -> dict[str, Any] | None:
     return {"q": q, "error": abs(q[0] - q[3]), "order": order, "extrapolated": off, "gci": index}
 
 
-def q95(values: list[float]) -> float:
-    """Return the 95 % quantile, interpolated linearly."""
-    values, place = sorted(values), 0.95 * (len(values) - 1)
-    low, high = values[math.floor(place)], values[math.ceil(place)]
-    return low + (place - math.floor(place)) * (high - low)
-
-
 def of_all(name: str, of: str, runs: list[dict[str, Any]], files: int) -> Any:
     """Return a figure of all runs by its definition."""
     checks = [at for run in runs for _, at in run["checks"]]
@@ -167,7 +160,8 @@ def of_all(name: str, of: str, runs: list[dict[str, Any]], files: int) -> Any:
         return len(made) if name == "series" else same
     kind, _, part = name.replace("orders", "order").partition("_")
     values = [one[kind] for one in made if one[kind] is not None]
-    return median(values) if part == "median" else q95(values) if part == "q95" else len(values)
+    q95 = quantiles(values, n=20, method="inclusive")[18] if len(values) > 1 else sum(values)
+    return {"median": median(values or [0]), "q95": q95}.get(part, len(values))
 
 
 def check(base: Path) -> Iterator[tuple[str, Any, Any, bool | None]]:
@@ -194,8 +188,9 @@ def check(base: Path) -> Iterator[tuple[str, Any, Any, bool | None]]:
             if said["template"] and made != said["text"]:
                 yield f"text of {item['id']}", said["text"], made, False
         if item["status"] not in ("yours", "stated"):
-            lacks = {*item["needs"]} - texts.keys() or not item["claim"]["template"]
-            word = "gap" if lacks else "partly" if item["note"] else "filled"
+            word = (
+                "gap" if {*item["needs"]} - texts.keys() else "partly" if item["note"] else "filled"
+            )
             yield f"status of {item['id']}", item["status"], word, item["status"] == word
     hang = {(name, row + 1) for name, run in runs.items() for row, at in run["checks"]
             if not stable(at)}  # fmt: skip
