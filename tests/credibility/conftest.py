@@ -12,7 +12,7 @@ from bridgegen.jobs.credibility import export
 
 SEARCHES = {
     "hangs": ("cut-out", {"ego": "route-follower", "algorithm": "pso"}),
-    "fails": ("crossroads-s4", {"ego": "route-follower", "algorithm": "random"}),
+    "random": ("crossroads-s4", {"ego": "route-follower", "algorithm": "random"}),
     "clean": ("cut-in", {"ego": "reference", "algorithm": "random"}),
 }
 

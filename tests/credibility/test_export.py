@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 import yaml
 from tests.approval import ROOT, refuses
+from tests.safety_case.test_argument import confirmed_in_double
 
 import bridgegen as bg
 from bridgegen.base.errors import FileFormatError, InputError, StorageError
+from bridgegen.jobs.credibility.convergence import Convergence
 from bridgegen.jobs.credibility.items import ASKED, CHAPTERS, FORM, ORACLES, SOURCES
 
 
@@ -181,7 +183,7 @@ def test_what_cannot_be_read_is_a_gap_and_the_rest_goes_on(project, recomputed, 
 
 
 def test_if_no_run_can_be_read_everything_is_a_gap(project, recomputed):
-    for run in ("hangs", "fails", "clean"):
+    for run in ("hangs", "random", "clean"):
         (project / run / "triage.json").write_text("{}")
     found = bg.export_credibility([project], out=project / "out")
     assert found.dossier.figures["unread"] == 3
@@ -190,7 +192,7 @@ def test_if_no_run_can_be_read_everything_is_a_gap(project, recomputed):
 
 
 def test_a_triage_without_finer_steps_is_named(project):
-    path = project / "fails" / "triage.json"
+    path = project / "random" / "triage.json"
     data = json.loads(path.read_text("utf-8"))
     data["step_checks"] = []
     path.write_text(json.dumps(data), "utf-8")
@@ -200,7 +202,7 @@ def test_a_triage_without_finer_steps_is_named(project):
 
 
 def test_hostile_words_are_text(project, recomputed):
-    path = project / "fails" / "triage.json"
+    path = project / "random" / "triage.json"
     data = json.loads(path.read_text("utf-8"))
     data["ego"] = "<script>alert(1)</script> {all.runs} {0} \u202e"
     data["step_checks"][0]["at"][1]["conflict"] = "<img src=x onerror=alert(1)>"
@@ -241,7 +243,7 @@ def test_a_damaged_form_is_one_clear_error(made, tmp_path, text):
 
 
 def test_sensitivity_of_a_run_fills_its_item(project, recomputed):
-    (project / "fails" / "sensitivity.json").write_text("{}")
+    (project / "random" / "sensitivity.json").write_text("{}")
     found = bg.export_credibility([project], out=project / "out")
     assert items(found)["7.1"].status == "partly"
     assert any(one.file.endswith("sensitivity.json") for one in found.dossier.evidence)
@@ -256,7 +258,7 @@ def test_places_that_are_refused(made, tmp_path):
     with refuses(StorageError):
         bg.export_credibility([tmp_path])
     with refuses(InputError):
-        bg.export_credibility([made["clean"]], out=made["fails"])
+        bg.export_credibility([made["clean"]], out=made["random"])
     (tmp_path / "credibility.html").write_text("somebody's")
     with refuses(StorageError):
         bg.export_credibility([made["clean"]], out=tmp_path)
@@ -270,7 +272,7 @@ def test_the_command(cli, made, tmp_path):
     assert "items are filled by figures" in out
     code, out, err = cli(*words, "--json", "--fail-if", "gap >= 1")
     assert code == 3
-    assert "failed: gap >= 1" in err
+    assert "FAILED: not gap >= 1 (gap = 7)" in err
     assert json.loads(out)["figures"]["runs"] == 3
 
 
@@ -278,3 +280,35 @@ def test_items_have_ids_in_order_and_keys_of_their_own():
     ids = [item.id for item in ASKED]
     assert ids == sorted(set(ids), key=lambda id: [int(part) for part in id.split(".")])
     assert len(FORM) == sum(bool(item.form) for item in ASKED)
+
+
+def test_another_simulator_fills_validation(project, recomputed):
+    """Two exported scenarios are critical there, one is not, one did not run."""
+    confirmed_in_double(project / "hangs", [True, True, False, None])
+    found = bg.export_credibility([project], out=project / "out")
+    assert items(found)["8.1"].status == items(found)["9.3"].status == "filled"
+    (line,) = items(found)["8.1"].details
+    assert line.text.startswith(
+        "2 of 3 are critical in double, too; 95 % interval 9.42 % to 99.2 %"
+    )
+    assert recomputed(found.folder)[0] == 0
+
+
+def test_errors_are_those_that_the_definition_gives():
+    """q = 1 + h: first order; its extrapolation is exact. A series that swings has no order."""
+    first = Convergence.of([1.8, 1.4, 1.2, 1.1])
+    assert (first.order, first.error) == (pytest.approx(1.0), pytest.approx(0.7))
+    assert first.extrapolated == pytest.approx(0.8)
+    assert first.gci == pytest.approx(1.25 * 0.8)
+    second = Convergence.of([1.64, 1.16, 1.04, 1.01])
+    assert (second.order, second.extrapolated) == (pytest.approx(2.0), pytest.approx(0.64))
+    swings = Convergence.of([1.0, 0.9, 1.1, 1.0])
+    assert swings.order is None
+    assert swings.gci == pytest.approx(3 * swings.extrapolated) == pytest.approx(3 * 0.1)
+
+
+def test_a_simulator_in_which_nothing_ran_fills_nothing(project, recomputed):
+    confirmed_in_double(project / "hangs", [None, None])
+    found = bg.export_credibility([project], out=project / "out")
+    assert items(found)["8.1"].status == "gap"
+    assert recomputed(found.folder)[0] == 0

@@ -176,11 +176,11 @@ def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
 def _added(found: Read, numbers: Mapping[str, Number], different: Sequence[str]) -> Details:
     """Return what runs and package add to items, by their ids: templates of sentences."""
     runs = found.runs
-    names = sorted({record.simulator for facts in runs.values() for record in facts.confirmations})
+    ran = [number for name, number in numbers.items() if name.startswith("all.ran:")]
     simulators = [
-        f"{{all.confirmed:{k}}} of {{all.ran:{k}}} are critical in {name}, too; 95 % interval "
+        f"{{all.confirmed:{k}}} of {{all.ran:{k}}} are critical in {number.of}, too; 95 % interval "
         f"{{all.confirmed_low:{k}}} to {{all.confirmed_high:{k}}}."
-        for k, name in enumerate(names, start=1)
+        for k, number in enumerate(ran, start=1)
     ]
     return {
         "3.1": [text for text, _ in assumptions([*runs.values()])] if runs else [],

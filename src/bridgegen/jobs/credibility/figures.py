@@ -131,10 +131,12 @@ def _of_simulators(runs: Sequence[Facts], numbers: Numbers) -> None:
     by_name = defaultdict(list)
     for facts in runs:
         for record in facts.confirmations:
-            by_name[record.simulator].append(record)
+            found = summarise(record.scenarios)
+            if found.ran:
+                by_name[record.simulator].append(found)
     for k, name in enumerate(sorted(by_name), start=1):
-        found = [summarise(record.scenarios) for record in by_name[name]]
-        ran, confirmed = (sum(getattr(one, key) for one in found) for key in ("ran", "confirmed"))
+        ran = sum(found.ran for found in by_name[name])
+        confirmed = sum(found.confirmed for found in by_name[name])
         low, high = clopper_pearson(confirmed, ran)
         numbers.add(f"ran:{k}", ran, of=name, source=f"{PREFIX}*")
         numbers.add(f"confirmed:{k}", confirmed, of=name, source=f"{PREFIX}*")
