@@ -312,3 +312,11 @@ def test_a_simulator_in_which_nothing_ran_fills_nothing(project, recomputed):
     found = bg.export_credibility([project], out=project / "out")
     assert items(found)["8.1"].status == "gap"
     assert recomputed(found.folder)[0] == 0
+
+
+def test_a_run_that_is_not_read_fails_the_command(cli, project):
+    (project / "hangs" / "triage.json").unlink()
+    code, _, err = cli("credibility", str(project), "--out", str(project / "out"))
+    assert code == 3
+    assert "FAILED: the runs could be read" in err
+    assert "triage.json is missing" in err

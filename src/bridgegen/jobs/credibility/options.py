@@ -37,7 +37,7 @@ JOB = Job(
     name="credibility",
     options=CredibilityOptions,
     function="bridgegen.jobs.credibility.export:export_credibility",
-    help="""Export a credibility dossier of the toolchain: each claim with its figure.
+    help="""Export a dossier on the tool, with figures.
 
     In the chapters that authorities ask for, as JSON and a page, with a script that recomputes
     every figure, and a form for what people must state.
