@@ -318,5 +318,5 @@ def test_a_run_that_is_not_read_fails_the_command(cli, project):
     (project / "hangs" / "triage.json").unlink()
     code, _, err = cli("credibility", str(project), "--out", str(project / "out"))
     assert code == 3
-    assert "FAILED: the runs could be read" in err
+    assert "NOT JUDGED: the runs could be read" in err
     assert "triage.json is missing" in err
