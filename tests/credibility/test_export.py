@@ -170,6 +170,9 @@ def pipe(run: Path) -> None:
 @pytest.mark.parametrize("what", DAMAGE)
 def test_what_cannot_be_read_is_a_gap_and_the_rest_goes_on(project, recomputed, what):
     DAMAGE[what](project / "hangs")
+    # What another run lacks comes after that.
+    data = json.loads((project / "clean" / "triage.json").read_text("utf-8")) | {"step_checks": []}
+    (project / "clean" / "triage.json").write_text(json.dumps(data), "utf-8")
     found = bg.export_credibility([project], out=project / "out")
     assert [run.scenario for run in found.dossier.runs] == ["cut-in", "crossroads-s4"]
     gap = found.dossier.gaps[0]
@@ -178,6 +181,7 @@ def test_what_cannot_be_read_is_a_gap_and_the_rest_goes_on(project, recomputed, 
     assert "hangs" in (found.folder / "gaps.txt").read_text("utf-8")
     assert items(found)["1.3"].status == "partly"
     assert not found.judged()[0].holds
+    assert found.judged()[0].details == gap.why
     assert "1 run of 3 could not be read" in found.shown()[0]
     assert recomputed(found.folder)[0] == 0
 
@@ -212,6 +216,9 @@ def test_hostile_words_are_text(project, recomputed):
     assert "<script>alert" not in text
     assert "<img" not in text
     assert "&lt;script&gt;alert(1)" in text
+    shares = [line.text for line in items(found)["9.1"].details]
+    assert any("<script>alert(1)</script> (all.runs) (0)" in line for line in shares)
+    assert len(shares) == 3
     assert recomputed(found.folder)[0] == 0
 
 

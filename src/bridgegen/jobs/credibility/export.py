@@ -42,7 +42,7 @@ class Read:
 
     Attributes:
         runs: those that were read, by id.
-        gaps: why others were not, and what the former lack.
+        gaps: why others were not, then what the former lack.
         unread: how many were not.
     """
 
@@ -54,20 +54,18 @@ class Read:
 def read(folders: Sequence[Path]) -> Read:
     """Read runs; what is wrong with one is a gap, and the rest is read."""
     runs: dict[str, Facts] = {}
-    gaps: list[Gap] = []
-    unread = 0
+    unread: list[Gap] = []
     for folder in folders:
         try:
             _refuse_links(folder)
             facts = read_facts(folder)
         except (BridgeGenError, OSError) as error:
             problems = error.problems if isinstance(error, BridgeGenError) else [str(error)]
-            gaps.append(Gap(place=str(folder), why="; ".join(problems)[:4000]))
-            unread += 1
-            continue
-        runs[f"R{len(runs) + 1}"] = facts
-        gaps += _lacks(facts)
-    return Read(runs, gaps, unread)
+            unread.append(Gap(place=str(folder), why="; ".join(problems)[:4000]))
+        else:
+            runs[f"R{len(runs) + 1}"] = facts
+    lacks = [gap for facts in runs.values() for gap in _lacks(facts)]
+    return Read(runs, (*unread, *lacks), len(unread))
 
 
 def _refuse_links(folder: Path) -> None:
@@ -133,7 +131,8 @@ def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
     more.add("installed", len(distributions), again="python -m pip list")
     more.add("files", len(evidence), source=FILE)
     numbers |= {number.id: number for number in more.all}
-    details, notes = _added(found, numbers, different), _notes(found, numbers, rows=rows)
+    details = _added(runs, numbers, different)
+    notes = _notes(found, numbers, rows=rows)
     items = tuple(
         _filled(
             replace(
@@ -173,27 +172,35 @@ def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
     )
 
 
-def _added(found: Read, numbers: Mapping[str, Number], different: Sequence[str]) -> Details:
+def _plain(text: str) -> str:
+    """Return a text of a run for a template: its braces name no number."""
+    return text.translate({ord("{"): "(", ord("}"): ")"})
+
+
+def _added(
+    runs: Mapping[str, Facts], numbers: Mapping[str, Number], different: Sequence[str]
+) -> Details:
     """Return what runs and package add to items, by their ids: templates of sentences."""
-    runs = found.runs
     ran = [number for name, number in numbers.items() if name.startswith("all.ran:")]
     simulators = [
-        f"{{all.confirmed:{k}}} of {{all.ran:{k}}} are critical in {number.of}, too; 95 % interval "
-        f"{{all.confirmed_low:{k}}} to {{all.confirmed_high:{k}}}."
+        f"{{all.confirmed:{k}}} of {{all.ran:{k}}} are critical in {_plain(number.of)}, too; "
+        f"95 % interval {{all.confirmed_low:{k}}} to {{all.confirmed_high:{k}}}."
         for k, number in enumerate(ran, start=1)
     ]
     return {
-        "3.1": [text for text, _ in assumptions([*runs.values()])] if runs else [],
+        "3.1": [_plain(text) for text, _ in assumptions([*runs.values()])] if runs else [],
         "4.1": [
-            f"{name}: digest of the scenario {facts.run.settings.fingerprint}, of all evaluations "
-            f"{facts.triage.results}."
+            _plain(
+                f"{name}: digest of the scenario {facts.run.settings.fingerprint}, of all "
+                f"evaluations {facts.triage.results}."
+            )
             for name, facts in runs.items()
         ],
         "5.1": [f"Differs: {name}." for name in different],
         "8.1": simulators,
         "9.3": simulators,
         "9.1": [
-            f"{name}, {facts.triage.scenario} with {facts.ego}: "
+            _plain(f"{name}, {facts.triage.scenario} with {facts.ego}: ")
             + (f"{{{name}.share_low}}" if f"{name}.share_low" in numbers else "0 %")
             + f" to {{{name}.share_high}} ({{{name}.drawn_harmful}} of {{{name}.drawn_known}})."
             for name, facts in runs.items()
@@ -376,6 +383,7 @@ def _runs_of(named: Sequence[Path]) -> list[Path]:
                 raise StorageError(f"{path}: contains no run, nor does any folder below it")
         for folder in here:
             found.setdefault(folder.resolve(), folder)
-    if len(found) > MOST_RUNS:
-        raise InputError(f"a dossier is of at most {MOST_RUNS:,} runs, got {len(found):,}")
+    # Folders beyond that are not found, so they could not be named.
+    if len(found) >= MOST_RUNS:
+        raise InputError(f"a dossier is of fewer than {MOST_RUNS:,} runs")
     return list(found.values())
