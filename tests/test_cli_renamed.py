@@ -9,7 +9,7 @@ from bridgegen.cli.groups import PANELS, RENAMED
 
 SEEN = (
     "demo search resume suite diff benchmark preventability risk open analyse confirm export "
-    "dashboard safety-case new validate draw simulate mine fit list ontology doctor"
+    "dashboard safety-case credibility new validate draw simulate mine fit list ontology doctor"
 )
 
 

@@ -40,6 +40,7 @@ GIVEN = {
         "folder": Path("project"), "criteria": ["R-1: min(ego.v) < 3 m/s"], "update": True,
     },
     "safety-case": {"runs": (Path("/runs/a"), Path("/runs/b"))},
+    "credibility": {"runs": (Path("/runs/a"), Path("/runs/b"))},
     "mine": {
         "recordings": (Path("/recorded/a.csv"),), "road_map": Path("/recorded/a.xodr"),
         "time_step": 0.1, "scenarios": (Path("/mine/a.yaml"),),

@@ -60,7 +60,7 @@ SHORT = {
 Pages ``AS_PRINTED`` and ``TRIAGED`` triage; each other search would take twice as long with it.
 """
 
-TRIAGED = ("dashboard", "read-a-report", "suites")
+TRIAGED = ("credibility", "dashboard", "read-a-report", "suites")
 """Pages whose later commands need the failure modes of a search."""
 
 FEW = {

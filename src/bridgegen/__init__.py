@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from bridgegen.engine.simulate import simulate_file
     from bridgegen.jobs.compare.comparison import compare
     from bridgegen.jobs.compare.result import Comparison
+    from bridgegen.jobs.credibility.export import export_credibility
     from bridgegen.jobs.dashboard.dashboard import Dashboard, build_dashboard
     from bridgegen.jobs.mine.mine import Mined, mine
     from bridgegen.jobs.preventability.preventability import map_preventability
@@ -50,6 +51,7 @@ __all__ = [
     "confirm",
     "errors",
     "estimate_risk",
+    "export_credibility",
     "export_safety_case",
     "exposure_of",
     "fit_exposure",
@@ -92,6 +94,7 @@ _HOMES = {
     "estimate_risk": "bridgegen.jobs.risk.risk",
     "resume": "bridgegen.jobs.search",
     "run_search": "bridgegen.jobs.search",
+    "export_credibility": "bridgegen.jobs.credibility.export",
     "export_safety_case": "bridgegen.jobs.safety_case.export",
     "SafetyCase": "bridgegen.jobs.safety_case.model",
     "simulate_file": "bridgegen.engine.simulate",

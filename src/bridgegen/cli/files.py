@@ -244,8 +244,8 @@ def validate(
             "--schema",
             help="Print a JSON Schema, with which editors complete and check files. In place of "
             "FILE, the kind: scenario (default), fragment, exposure, run (of a search), "
-            "algorithms, suite, diff, risk, preventability, dashboard or mine (run files of "
-            "these), or safety-case (for programs that read one).",
+            "algorithms, suite, diff, risk, preventability, dashboard, credibility or mine (run "
+            "files of these), or safety-case (for programs that read one).",
         ),
     ] = False,
     out: Annotated[

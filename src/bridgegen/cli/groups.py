@@ -15,7 +15,15 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 PANELS = {
     "Search": ("demo", "search", "resume", "suite", "diff", "benchmark", "preventability", "risk"),
-    "Look at results": ("open", "analyse", "confirm", "export", "dashboard", "safety-case"),
+    "Look at results": (
+        "open",
+        "analyse",
+        "confirm",
+        "export",
+        "dashboard",
+        "safety-case",
+        "credibility",
+    ),
     "Files": ("new", "validate", "draw", "simulate", "mine", "fit"),
     "More": ("list", "ontology", "doctor"),
 }

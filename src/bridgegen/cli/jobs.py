@@ -28,6 +28,7 @@ from bridgegen.engine.options import options_of
 from bridgegen.engine.options.option import OUTPUT, WHAT
 from bridgegen.jobs.benchmark.options import JOB as BENCHMARK
 from bridgegen.jobs.compare.options import JOB as COMPARE
+from bridgegen.jobs.credibility.options import JOB as CREDIBILITY
 from bridgegen.jobs.dashboard.options import JOB as DASHBOARD
 from bridgegen.jobs.frame import Job, JobResult
 from bridgegen.jobs.mine.options import JOB as MINE
@@ -36,13 +37,25 @@ from bridgegen.jobs.risk.options import JOB as RISK
 from bridgegen.jobs.safety_case.options import JOB as SAFETY_CASE
 from bridgegen.jobs.suite.options import DIFF, SUITE
 
-JOBS = (COMPARE, SUITE, DIFF, BENCHMARK, PREVENTABILITY, RISK, DASHBOARD, SAFETY_CASE, MINE)
+JOBS = (
+    COMPARE,
+    SUITE,
+    DIFF,
+    BENCHMARK,
+    PREVENTABILITY,
+    RISK,
+    DASHBOARD,
+    SAFETY_CASE,
+    CREDIBILITY,
+    MINE,
+)
 """Jobs in the order of ``--help``."""
 
 _CRITERIA = {
     SUITE.name: "of_suite:SuiteCriteria",
     DIFF.name: "of_difference:DifferenceCriteria",
     SAFETY_CASE.name: "of_job:JobVerdict",
+    CREDIBILITY.name: "of_job:JobVerdict",
 }
 """Classes of criteria in `bridgegen.cli.verdict` by job; ``JobCriteria`` for all others."""
 

@@ -1,6 +1,6 @@
 """What a run was made of, and what its results assume: contexts, assumptions, justifications."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 
 from bridgegen.assess.conflict.harm import NEAR_MISS
@@ -145,11 +145,12 @@ def _unit(parameter: Parameter) -> str:
 
 def add_assumptions(strategy: Draft, egos: list[Facts]) -> None:
     """Add what the results of runs assume of the world: the limits of the simulation."""
-    for number, (text, place) in enumerate(_assumptions(egos), start=1):
+    for number, (text, place) in enumerate(assumptions(egos), start=1):
         strategy.add("Assumption", f"{strategy.at}.{number}", text, link=f"{LIMITS}{place}")
 
 
-def _assumptions(runs: list[Facts]) -> Iterator[tuple[str, str]]:
+def assumptions(runs: Sequence[Facts]) -> Iterator[tuple[str, str]]:
+    """Yield what the results of runs assume of the world, and the place in the limits of each."""
     simulators = {run.run.settings.simulator.name for run in runs}
     if EMBEDDED.name in simulators:
         yield (

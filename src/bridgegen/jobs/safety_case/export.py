@@ -1,6 +1,5 @@
 """The safety case of runs: made, and written with its page and the script that recomputes it."""
 
-import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from bridgegen.jobs.safety_case.context import (
     generator,
     justification,
 )
-from bridgegen.jobs.safety_case.facts import Facts, Files, read_facts
+from bridgegen.jobs.safety_case.facts import Facts, Files, read_facts, run_facts
 from bridgegen.jobs.safety_case.measured import measure
 from bridgegen.jobs.safety_case.model import FILE, Number, RunFacts, SafetyCase
 from bridgegen.jobs.safety_case.numbers import Numbers
@@ -61,7 +60,7 @@ def build(runs: Sequence[Facts], out: Path) -> SafetyCase:
             add_assumptions(inner, [facts])
         RunArgument(inner, facts, files, of).build()
         evidence += files.all
-        found.append(_facts(facts, f"R{k}", out))
+        found.append(run_facts(facts, f"R{k}", out))
     elements, relations = finish(top, numbers)
     return SafetyCase(
         generator=generator(),
@@ -110,28 +109,6 @@ def _over(runs: Sequence[Facts], numbers: dict[str, Number]) -> Draft:
         )
     add_assumptions(strategy, list(runs))
     return top
-
-
-def _facts(facts: Facts, name: str, out: Path) -> RunFacts:
-    settings, triage = facts.run.settings, facts.triage
-    folder = os.path.relpath(facts.run.folder.resolve(), out.resolve())
-    drawn = triage.bound.space.drawn
-    return RunFacts(
-        id=name,
-        folder=Path(folder).as_posix(),
-        scenario=triage.scenario,
-        ego=facts.ego,
-        algorithm=settings.algorithm,
-        seed=settings.seed,
-        version=facts.run.version,
-        results=triage.results,
-        count=triage.count,
-        drawn="" if not drawn else "fresh" if drawn == "fresh" else "run",
-        edges={
-            parameter.name: tuple(parameter.edges[1:-1].tolist())
-            for parameter in facts.coverage.parameters
-        },
-    )
 
 
 FOLDER, SCRIPT = "safety-case", "recompute.py"

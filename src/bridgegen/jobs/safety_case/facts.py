@@ -12,7 +12,7 @@ import numpy as np
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.drivers import file_of, is_remote, is_spec
-from bridgegen.jobs.safety_case.model import Evidence
+from bridgegen.jobs.safety_case.model import Evidence, RunFacts
 from bridgegen.jobs.safety_case.numbers import RUN
 from bridgegen.jobs.search.exported import FOLDER
 from bridgegen.jobs.search.restored import searched
@@ -163,6 +163,35 @@ def _triage(run: Run) -> Triage:
     return triage
 
 
+def run_facts(facts: Facts, name: str, out: Path) -> RunFacts:
+    """Return what a recomputation needs to know of a run.
+
+    Args:
+        facts: of the run.
+        name: id of the run in the record.
+        out: the record's folder, which the run's is named from.
+    """
+    settings, triage = facts.run.settings, facts.triage
+    folder = os.path.relpath(facts.run.folder.resolve(), out.resolve())
+    drawn = triage.bound.space.drawn
+    return RunFacts(
+        id=name,
+        folder=Path(folder).as_posix(),
+        scenario=triage.scenario,
+        ego=facts.ego,
+        algorithm=settings.algorithm,
+        seed=settings.seed,
+        version=facts.run.version,
+        results=triage.results,
+        count=triage.count,
+        drawn="" if not drawn else "fresh" if drawn == "fresh" else "run",
+        edges={
+            parameter.name: tuple(parameter.edges[1:-1].tolist())
+            for parameter in facts.coverage.parameters
+        },
+    )
+
+
 # --- The files that a safety case rests on, with their digests ---
 
 
@@ -195,8 +224,8 @@ class Files:
         settings, name = facts.run.settings, facts.run.folder.resolve().name
         self.resume = shlex.join(["bridgegen", "resume", name])
         search = settings.command(Path(name))
-        self.run = self._add(self._folder / RUN, "every evaluation of the search", search)
-        self.triage = self._add(
+        self.run = self.add(self._folder / RUN, "every evaluation of the search", search)
+        self.triage = self.add(
             self._folder / JSON_FILE,
             "failure modes, their neighbours, and the bound on the harmful share",
             self.resume,
@@ -205,12 +234,12 @@ class Files:
         for mode in facts.triage.modes[:MOST_SHOWN]:
             stems = [*mode.exports[:1], *([mode.minimal.name] if mode.minimal else [])]
             self.modes[mode.number] = [
-                self._add(path, shows, self.resume)
+                self.add(path, shows, self.resume)
                 for stem in stems
                 for path, shows in self._scenario(stem)
             ]
         self.confirmations = {
-            confirmation.simulator: self._add(
+            confirmation.simulator: self.add(
                 self._folder / file_name(confirmation.simulator),
                 f"exported scenarios simulated again in {confirmation.label}",
                 shlex.join(["bridgegen", "confirm", name, "--simulator", confirmation.simulator]),
@@ -218,7 +247,7 @@ class Files:
             for confirmation in facts.confirmations
         }
         self.inputs = [
-            self._add(path, shows, "")
+            self.add(path, shows, "")
             for path, shows in (
                 (settings.scenario if is_file(settings.scenario) else "", "the logical scenario"),
                 (settings.distribution, "the distribution of its parameters"),
@@ -229,7 +258,7 @@ class Files:
         code = file_of(settings.ego)
         self.driver = ""
         if code is not None and code.is_file():
-            self.driver = self._add(code, "the driver, as it is at the export", "")
+            self.driver = self.add(code, "the driver, as it is at the export", "")
 
     def _scenario(self, stem: str) -> Iterator[tuple[Path, str]]:
         """Yield the files of an exported scenario that exist, and what each shows."""
@@ -244,7 +273,7 @@ class Files:
             if stem and inside and path.is_file():
                 yield path, f"{stem}: {shows}"
 
-    def _add(self, path: Path | str, shows: str, command: str) -> str:
+    def add(self, path: Path | str, shows: str, command: str) -> str:
         """Add a file, unless it is known; return its id.
 
         Raises:

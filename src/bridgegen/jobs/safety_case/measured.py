@@ -34,7 +34,7 @@ def measure(facts: Facts, numbers: Numbers) -> None:
     """Add all numbers of a run."""
     _evaluations(facts, numbers)
     _failures(facts, numbers)
-    _space(facts, numbers)
+    measure_space(facts, numbers)
     _coverage(facts, numbers)
     _criteria(facts, numbers)
     for record in facts.confirmations:
@@ -103,7 +103,8 @@ def _mode(facts: Facts, mode: Mode, numbers: Numbers) -> None:
         numbers.add(f"severity{k}", facts.severity[k - 1], "percent", of=of)
 
 
-def _space(facts: Facts, numbers: Numbers) -> None:
+def measure_space(facts: Facts, numbers: Numbers) -> None:
+    """Add the harmful share of the searched space, with its interval, if it was estimated."""
     space, fresh = facts.triage.bound.space, facts.triage.fresh
     if not space.drawn or not space.rows or space.share is None:
         return

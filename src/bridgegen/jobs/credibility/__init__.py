@@ -1,0 +1,1 @@
+"""Credibility dossiers: what the toolchain can state of itself, in numbers, and what it cannot."""
