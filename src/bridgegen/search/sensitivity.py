@@ -248,7 +248,7 @@ def sentence(words: str, unit: str, at_least: float | None, at_most: float | Non
     """Return what a finding hangs on; "" if it does not."""
     unit = {"1": "", "×": " times its nominal value"}.get(unit, f" {unit}")
     if at_least is not None and at_most is not None:
-        return f"stands only while {words} is between {at_least:.3g} and {at_most:.3g}{unit}"
+        return f"stands only while {words} is between {at_least:.4g} and {at_most:.4g}{unit}"
     if at_most is not None:
-        return f"stands only while {words} is ≤ {at_most:.3g}{unit}"
-    return f"stands only while {words} is ≥ {at_least:.3g}{unit}" if at_least is not None else ""
+        return f"stands only while {words} is ≤ {at_most:.4g}{unit}"
+    return f"stands only while {words} is ≥ {at_least:.4g}{unit}" if at_least is not None else ""

@@ -52,9 +52,14 @@ def print_sensitivity(run: Path, found: "Sensitivity", *, as_json: bool) -> None
         )
         print()
     for finding in found.findings:
+        if finding.sentences:
+            print(f"evaluation {finding.evaluation + 1}: {finding.title}")
         for sentence in finding.sentences:
-            print(f"evaluation {finding.evaluation + 1} ({finding.title}) {sentence}")
+            print(f"    {sentence}")
     print(f"{in_a_sentence(found)}.")
     if found.left_out:
-        print(f"{found.left_out} more were not analysed: the budget, or a verdict not reproduced.")
+        print(
+            f"{found.left_out} more were not analysed: --findings, --budget, or a verdict that is "
+            "not reproduced."
+        )
     print(f"{found.evaluations:,} evaluations, seed {found.seed}: {run / PAGE}")

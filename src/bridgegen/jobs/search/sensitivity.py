@@ -347,6 +347,7 @@ def in_a_sentence(found: Sensitivity) -> str:
 def _write_page(path: Path, found: Sensitivity) -> None:
     """Write the page: which constant moves which verdict, and which findings hang on one."""
     moved = shares(found)
+    drawn = [one for one in moved if one.kind == "constant"]
     words = {one.name: one.words for one in found.constants}
     around = f"of the scenario, ±{percent(found.radius)} of its range"
     templates.write_page(
@@ -360,8 +361,8 @@ def _write_page(path: Path, found: Sensitivity) -> None:
             f"{found.trajectories} trajectories",
             f"{found.evaluations:,} evaluations",
         ],
-        verdict=templates.Banner(f"{in_a_sentence(found)}."),
-        picture=_bars([one for one in moved if one.kind == "constant"], words),
+        verdict=templates.Banner(f"{in_a_sentence(found)}.{_first(drawn, words)}"),
+        picture=_bars(drawn, words) if drawn else "",
         moved=[
             (
                 (
@@ -375,14 +376,15 @@ def _write_page(path: Path, found: Sensitivity) -> None:
             )
             for one in moved
         ],
-        findings=[
-            (
-                (f"{finding.evaluation + 1}", finding.title),
-                finding.conflict,
-                f"{finding.harm:.2f}",
-                "; ".join(finding.sentences) or "stands for all plausible values",
-            )
+        hanging=[
+            (f"evaluation {finding.evaluation + 1}", finding.title, "; ".join(finding.sentences))
             for finding in found.findings
+            if finding.sentences
+        ],
+        standing=[
+            (f"evaluation {finding.evaluation + 1}", finding.title, f"{finding.harm:.2f}")
+            for finding in found.findings
+            if not finding.sentences
         ],
         constants=[
             (
@@ -395,6 +397,15 @@ def _write_page(path: Path, found: Sensitivity) -> None:
         ],
         not_varied=[*found.not_varied.items()],
     )
+
+
+def _first(some: Sequence[Share], words: Mapping[str, str]) -> str:
+    """Return which constant moves verdicts most; "" if none does."""
+    if not some or not some[0].flips:
+        return ""
+    name = words[some[0].name]
+    share = percent(some[0].share)
+    return f" {name[0].upper()}{name[1:]} changes a verdict in {share} of trajectories, the most."
 
 
 def _value(value: float, unit: str) -> str:
