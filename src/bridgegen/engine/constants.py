@@ -10,7 +10,6 @@ motion that was recorded. At the nominal values both give the same bits.
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from types import FunctionType
 from typing import Any, Literal
 
@@ -290,7 +289,6 @@ def _times(value: Value, factor: float) -> Value:
     return float(value) * factor
 
 
-@lru_cache(maxsize=256)
 def _kernel(values: tuple[tuple[str, float], ...]) -> Callable[..., None]:
     """Return the conflict analysis of N rows with other limits; compiled where all are nominal."""
     from bridgegen.assess.conflict._conflict_kernels import analyse_rows

@@ -15,7 +15,7 @@ from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.trials import Trials
 from bridgegen.engine.workers import Threads
 from bridgegen.jobs.search.restored import pipeline_of
-from bridgegen.jobs.search.run import Run
+from bridgegen.jobs.search.run import REPORT, Run
 from bridgegen.pages import charts, templates
 from bridgegen.search import sensitivity as record
 from bridgegen.search.sensitivity import (
@@ -362,6 +362,7 @@ def _write_page(path: Path, found: Sensitivity) -> None:
             f"{found.evaluations:,} evaluations",
         ],
         verdict=templates.Banner(f"{in_a_sentence(found)}.{_first(drawn, words)}"),
+        has_report=path.with_name(REPORT).is_file(),
         picture=_bars(drawn, words) if drawn else "",
         moved=[
             (
