@@ -15,6 +15,7 @@ from tests.approval import refuses
 import bridgegen as bg
 from bridgegen.assess.objective import Objective
 from bridgegen.base.errors import BridgeGenError
+from bridgegen.engine.constants import Constant
 from bridgegen.engine.options import CommonOptions
 from bridgegen.jobs.compare.plan import begin, make_plan
 from bridgegen.jobs.search.exported import exported_scenarios, not_exported, read_facts
@@ -23,7 +24,7 @@ from bridgegen.results.confirmation.record import read_record as read_confirmati
 from bridgegen.results.store import Store
 from bridgegen.scenario.language.thresholds import Thresholds
 from bridgegen.search.regions.record import read_record as read_regions
-from bridgegen.search.sensitivity import Effect, Finding, Sensitivity, Varied
+from bridgegen.search.sensitivity import Effect, Finding, Sensitivity
 from bridgegen.search.sensitivity import read_record as read_sensitivity
 from bridgegen.search.triage.record import read_record as read_triage
 
@@ -84,7 +85,7 @@ SENSITIVITY = Sensitivity(
     scenario="cut-in", ego="reference", results="0" * 64, seed=1, trajectories=4, radius=0.025,
     evaluations=500, left_out=1, not_varied={"wheelbase": "paths lead the rear axle"},
     constants=(
-        Varied(name="a", words="the a", value=1.0, unit="s", low=0.5, high=2.0, source="b"),
+        Constant("a", "the a", 1.0, "s", 0.5, 2.0, "b", "c"),
     ),
     findings=(
         Finding(

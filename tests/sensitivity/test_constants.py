@@ -86,7 +86,7 @@ def reached(function, found):
     return found
 
 
-@pytest.mark.parametrize("constant", [one for one in CONSTANTS if one.where == "verdict"],
+@pytest.mark.parametrize("constant", [one for one in CONSTANTS if one.frozen],
                          ids=lambda one: one.name)  # fmt: skip
 def test_a_constant_of_the_verdict_reaches_the_analysis_and_nothing_else(constant):
     """Some function sees another value; those of the compiled analysis see the nominal one."""

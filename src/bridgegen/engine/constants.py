@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from types import FunctionType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -30,11 +30,6 @@ from bridgegen.scenario.weather import CLEAR_AIR
 from bridgegen.simulation.embedded.chassis._chassis_columns import BRAKE_LAG
 from bridgegen.simulation.embedded.program import UNSAID, Program
 
-Where = Literal["motion", "verdict"]
-
-LENGTH, WIDTH, AHEAD, BRAKES = 0, 1, 2, 5
-"""Columns of `Program.bodies`."""
-
 
 @dataclass(frozen=True)
 class Constant:
@@ -49,7 +44,7 @@ class Constant:
         high: the greatest.
         source: of the range, with its year; "Ours" where there is none.
         influences: what follows from it.
-        where: what it is a constant of, see above.
+        frozen: the name by which kernels of the conflict analysis know it; "" of the motion's.
     """
 
     name: str
@@ -60,7 +55,7 @@ class Constant:
     high: float
     source: str
     influences: str
-    where: Where
+    frozen: str = ""
 
 
 CONSTANTS = (
@@ -68,91 +63,90 @@ CONSTANTS = (
         "careful-reaction", "the careful driver's reaction time", limits.REACTION, "s", 0.7, 1.5,
         "UN R157, annex 3 (2021): 0.75 s; Green, Transportation Human Factors 2 (2000): 0.7 s if "
         "braking is expected, 1.25 s if not, 1.5 s if surprised",
-        "which conflicts count as preventable, so whether the ego is at fault", "verdict",
+        "which conflicts count as preventable, so whether the ego is at fault", "REACTION",
     ),
     Constant(
         "careful-braking", "the careful driver's deceleration", limits.BRAKING, "m/s²", 6.0, 8.34,
         "UN R157, annex 3 (2021): 0.774 g; Mattas et al., Accident Analysis & Prevention 148 "
         "(2020): 6 m/s²; the grip of a dry road, 0.85 g",
-        "as its reaction time", "verdict",
+        "as its reaction time", "BRAKING",
     ),
     Constant(
         "careful-jerk", "the careful driver's build-up of braking", limits.JERK, "m/s³", 7.6, 19.0,
         "UN R157, annex 3 (2021): 0.774 g within 0.6 s; within 1.0 s and 0.4 s: ours",
-        "as its reaction time", "verdict",
+        "as its reaction time", "JERK",
     ),
     Constant(
         "asked-braking", "the braking that one may ask of others", limits.COMFORT, "m/s²", 2.0, 3.5,
         "UN R79, 5.6.4.7 (2018): 3 m/s²; ISO 15622 (2018): 3.5 m/s² at speed; 2 m/s²: ours",
-        "who is responsible where the other one had to brake", "verdict",
+        "who is responsible where the other one had to brake", "COMFORT",
     ),
     Constant(
         "near-miss-ttc", "a near miss's largest time to collision", limits.SERIOUS_TTC, "s", 1.0,
         2.0,
         "van der Horst and Hogema (1993): 1.5 s; Hayward (1972): 1 s; UN R157, annex 3 (2021): 2 s",
-        "what is a near miss", "verdict",
+        "what is a near miss", "SERIOUS_TTC",
     ),
     Constant(
         "near-miss-braking", "the braking that a near miss needs at least",
         limits.SERIOUS_DECELERATION, "m/s²", 3.0, 5.0,
         "Archer (2005): 3.35 m/s²; UN R79 (2018): 3 m/s²; UN R157, 5.3.1 (2021): 5 m/s²",
-        "what is a near miss", "verdict",
+        "what is a near miss", "SERIOUS_DECELERATION",
     ),
     Constant(
         "close-call", "the distance of a close call", limits.CLOSE_CALL, "m", 0.25, 1.0, "Ours",
-        "what is a near miss, even if braking is comfortable", "verdict",
+        "what is a near miss, even if braking is comfortable", "CLOSE_CALL",
     ),
     Constant(
         "contact-friction", "the friction between bodies in a collision", severity.FRICTION, "1",
         0.3, 1.0, "McHenry and McHenry, SAE 970947 (1997): 0.55, recommended range 0.3 to 1.0",
-        "severity, so harm; no verdict by itself", "verdict",
+        "severity, so harm; no verdict by itself", "FRICTION",
     ),
     Constant(
         "injury-odds", "the odds of MAIS3+ at a speed", 1.0, "×", 0.5, 2.0,
         "Ours: between curves for ages and body regions in Lubbe et al. (2022) and Wang (2022)",
-        "severity, so harm; no verdict by itself", "verdict",
+        "severity, so harm; no verdict by itself", "INTERCEPTS",
     ),
     Constant(
         "car-mass", "the mass of a car in a collision", float(severity.MASS[CAR]), "kg", 1100.0,
         2200.0, "ICCT, European Vehicle Market Statistics 2017/18: 1392 kg on average; range: ours",
-        "severity, so harm; no verdict by itself", "verdict",
+        "severity, so harm; no verdict by itself", "MASS",
     ),
     Constant(
         "road-friction", "the friction of the dry road", DRY_FRICTION, "1", 0.8, 0.9,
         "Wong, Theory of Ground Vehicles, table 1.3 (2008): 0.8 to 0.9",
-        "what tyres give, of everybody; scaled by the weather", "motion",
+        "what tyres give, of everybody; scaled by the weather",
     ),
     Constant(
         "ego-length", "the ego's length", 1.0, "×", 0.93, 1.09,
         "Cars of 4.3 m (European Commission, JRC-FSM, 2022) to 5.0 m, of 4.6 m here",
-        "contacts, gaps, clearing times", "motion",
+        "contacts, gaps, clearing times",
     ),
     Constant(
         "ego-width", "the ego's width", 1.0, "×", 0.95, 1.05,
-        "Ours: cars 1.8 to 2.0 m wide, of 1.9 m here", "contacts and passing", "motion",
+        "Ours: cars 1.8 to 2.0 m wide, of 1.9 m here", "contacts and passing",
     ),
     Constant(
         "ego-braking", "the ego's largest deceleration", 1.0, "×", 0.71, 1.1,
         "UN R13-H, annex 3 (2018): 6.43 m/s² at least, of 9 m/s² here; 1.1: ours",
-        "how the ego brakes in an emergency", "motion",
+        "how the ego brakes in an emergency",
     ),
     Constant(
         "others-size", "the others' size", 1.0, "×", 0.95, 1.05, "Ours",
-        "contacts, gaps, what hides whom", "motion",
+        "contacts, gaps, what hides whom",
     ),
     Constant(
         "others-braking", "the others' largest deceleration", 1.0, "×", 0.71, 1.1,
-        "as of the ego's", "others that brake as hard as they can", "motion",
+        "as of the ego's", "others that brake as hard as they can",
     ),
     Constant(
         "brake-lag", "the lag of the ego's brakes", 1.0, "×", 0.5, 2.0,
         "Ours: 0.1 to 0.4 s, of 0.2 s of a car here", "vehicles with dynamics (--vehicle)",
-        "motion",
     ),
     Constant(
         "clear-air", "the visual range of clear air", CLEAR_AIR, "m", 5e3, 2e4,
         "International visibility code: light haze 4 to 10 km, clear 10 to 20 km (WMO-No. 8, 2018)",
-        "how far sensors see; scales what the weather states", "motion",
+        "how far sensors see; scales what the weather states",
     ),
 )  # fmt: skip
 """All constants that can be varied."""
@@ -172,17 +166,6 @@ NOT_VARIED = {
 """Constants that stay as they are, and why."""
 
 BY_NAME: Mapping[str, Constant] = {constant.name: constant for constant in CONSTANTS}
-
-_LIMITS = {
-    "careful-reaction": "REACTION",
-    "careful-braking": "BRAKING",
-    "careful-jerk": "JERK",
-    "asked-braking": "COMFORT",
-    "near-miss-ttc": "SERIOUS_TTC",
-    "near-miss-braking": "SERIOUS_DECELERATION",
-    "close-call": "CLOSE_CALL",
-}
-"""Names of constants in ``assess.conflict._limits``."""
 
 
 def applying(program: Program) -> tuple[Constant, ...]:
@@ -213,11 +196,9 @@ def try_with(
     factors = {
         name: value / BY_NAME[name].value
         for name, value in values.items()
-        if BY_NAME[name].where == "motion" and value != BY_NAME[name].value
+        if not BY_NAME[name].frozen and value != BY_NAME[name].value
     }
-    judged = tuple(
-        sorted((name, value) for name, value in values.items() if BY_NAME[name].where == "verdict")
-    )
+    kernel = _kernel(values)
     parts: list[tuple[Int, Trials]] = []
     for at, here in runner.by_variant(X):
         if here.refused:
@@ -227,7 +208,7 @@ def try_with(
         roads = there.roads_of(X[at])
         rollout = there.run(X[at], noise=here.noise_keys(noise[at]), roads=roads)
         # What follows (violations, harm, places) takes the analysis that the rollout has.
-        analysis.analyse_by(rollout, _kernel(judged))
+        analysis.analyse_by(rollout, kernel)
         parts.append((at, Trials.of(rollout, *roads, harm, count)))
     order = np.argsort(np.concatenate([at for at, _ in parts]))
     return Trials.join([part for _, part in parts]).take(order)
@@ -248,21 +229,24 @@ def _moved(runner: Runner, x: Float, factors: Mapping[str, float]) -> Runner:
     return there
 
 
+_LENGTH, _WIDTH, _AHEAD, _BRAKES = 0, 1, 2, 5  # columns of `Program.bodies`
+_EGO, _OTHERS = slice(0, 1), slice(1, None)
+_BODIES = {
+    "ego-length": (_EGO, [_LENGTH, _AHEAD]),
+    "ego-width": (_EGO, [_WIDTH]),
+    "ego-braking": (_EGO, [_BRAKES]),
+    "others-size": (_OTHERS, [_LENGTH, _WIDTH, _AHEAD]),
+    "others-braking": (_OTHERS, [_BRAKES]),
+}
+
+
 def scaled(program: Program, factors: Mapping[str, float]) -> Program:
     """Return a program with constants of the motion times a factor, by name."""
     bodies, chassis, weathers = program.bodies.copy(), program.chassis.copy(), program.weathers
     slots = list(program.slots)
     for name, factor in factors.items():
-        if name == "ego-length":
-            bodies[0, [LENGTH, AHEAD]] *= factor
-        elif name == "ego-width":
-            bodies[0, WIDTH] *= factor
-        elif name == "ego-braking":
-            bodies[0, BRAKES] *= factor
-        elif name == "others-size":
-            bodies[1:, [LENGTH, WIDTH, AHEAD]] *= factor
-        elif name == "others-braking":
-            bodies[1:, BRAKES] *= factor
+        if name in _BODIES:
+            bodies[_BODIES[name]] *= factor
         elif name == "brake-lag":
             chassis[BRAKE_LAG] *= factor
         else:
@@ -275,9 +259,8 @@ def scaled(program: Program, factors: Mapping[str, float]) -> Program:
                     said = weathers[row, column]
                     slots.append(_times(clear if said == UNSAID else slots[said], factor))
                     weathers[row, column] = len(slots) - 1
-    return replace(
-        program, bodies=bodies, chassis=chassis, weathers=weathers, slots=tuple(slots)
-    )  # fmt: skip
+    there = replace(program, bodies=bodies, chassis=chassis, weathers=weathers)
+    return replace(there, slots=tuple(slots))
 
 
 def _times(value: Value, factor: float) -> Value:
@@ -289,11 +272,15 @@ def _times(value: Value, factor: float) -> Value:
     return float(value) * factor
 
 
-def _kernel(values: tuple[tuple[str, float], ...]) -> Callable[..., None]:
-    """Return the conflict analysis of N rows with other limits; compiled where all are nominal."""
+def _kernel(values: Mapping[str, float]) -> Callable[..., None]:
+    """Return the conflict analysis with other limits; the compiled one where all are nominal."""
     from bridgegen.assess.conflict._conflict_kernels import analyse_rows
 
-    changed = {name: value for name, value in values if value != BY_NAME[name].value}
+    changed = {
+        name: value
+        for name, value in values.items()
+        if BY_NAME[name].frozen and value != BY_NAME[name].value
+    }
     return analyse_rows if not changed else interpreted(analyse_rows, changed)
 
 
@@ -302,19 +289,16 @@ def interpreted(kernel: Any, values: Mapping[str, float]) -> Callable[..., None]
 
     Every kernel that it calls is taken so, too: machine code has the constants frozen.
     """
-    changes: list[tuple[Any, str, Any]] = []
-    for name, value in values.items():
-        if name in _LIMITS:
-            changes.append((limits, _LIMITS[name], value))
-        elif name == "contact-friction":
-            changes.append((severity, "FRICTION", value))
-        elif name == "car-mass":
-            mass = severity.MASS.copy()
-            mass[CAR] = value
-            changes.append((severity, "MASS", mass))
-        else:
-            odds = severity.INTERCEPTS + elementary.log(value)
-            changes.append((severity, "INTERCEPTS", odds))
+    changes: list[tuple[str, Any, Any]] = []
+    for constant, value in ((BY_NAME[name], value) for name, value in values.items()):
+        nominal = getattr(limits if hasattr(limits, constant.frozen) else severity, constant.frozen)
+        new: Any = value
+        if constant.name == "injury-odds":
+            new = nominal + elementary.log(value)
+        elif constant.name == "car-mass":
+            new = nominal.copy()
+            new[CAR] = value
+        changes.append((constant.frozen, nominal, new))
     made: dict[Any, Callable[..., Any]] = {}
 
     def of(kernel: Any) -> Callable[..., Any]:
@@ -326,10 +310,10 @@ def interpreted(kernel: Any, values: Mapping[str, float]) -> Callable[..., None]
             )
             for name in plain.__code__.co_names:
                 there = names.get(name)
-                for module, constant, value in changes:
+                for frozen, nominal, new in changes:
                     # By identity, too: another module may have a constant of the same name.
-                    if name == constant and there is getattr(module, constant):
-                        names[name] = value
+                    if name == frozen and there is nominal:
+                        names[name] = new
                 if hasattr(there, "py_func"):
                     names[name] = of(there)
             return made_of

@@ -17,6 +17,7 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import FileFormatError
 from bridgegen.base.records import read_model
+from bridgegen.engine.constants import Constant
 
 JSON_FILE = "sensitivity.json"
 """File of the record in a run's folder."""
@@ -89,18 +90,6 @@ class Finding(_Model):
     sentences: Annotated[tuple[Text, ...], Field(max_length=100)]
 
 
-class Varied(_Model):
-    """A constant that was varied; see `bridgegen.engine.constants.Constant`."""
-
-    name: Name
-    words: Text
-    value: Number
-    unit: Name
-    low: Number
-    high: Number
-    source: Text
-
-
 class Sensitivity(_Model):
     """The record of a run.
 
@@ -128,7 +117,7 @@ class Sensitivity(_Model):
     trajectories: Count
     radius: Number
     evaluations: Count
-    constants: Annotated[tuple[Varied, ...], Field(max_length=100)]
+    constants: Annotated[tuple[Constant, ...], Field(max_length=100)]
     not_varied: Annotated[dict[Text, Text], Field(max_length=100)]
     findings: Annotated[tuple[Finding, ...], Field(max_length=1000)]
     left_out: Count

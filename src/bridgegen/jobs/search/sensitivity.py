@@ -1,9 +1,9 @@
 """Which constants of the models the verdicts on a finished run's findings hang on."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from bridgegen.search.sensitivity import (
     Effect,
     Finding,
     Sensitivity,
-    Varied,
 )
 from bridgegen.search.triage.moves import nearest, reaches, searched
 from bridgegen.search.triage.neighbours import RADIUS
@@ -40,30 +39,26 @@ TRAJECTORIES, LEAST = 4, 2
 """Trajectories of Morris's design: by default, and the fewest by which it has a sigma."""
 
 
-@dataclass(frozen=True)
-class Share:
+class Share(NamedTuple):
     """What a constant or a parameter moves in all findings of a record.
 
     Attributes:
+        share: of trajectories in which it changes the verdict.
         name: of it.
         kind: "constant" or "parameter".
-        flips: trajectories in which it changes the verdict.
-        of: trajectories.
+        flips: these trajectories.
+        of: all trajectories.
         mu_star: mean over the findings.
         alone: findings whose verdict it changes alone, within its plausible range.
     """
 
+    share: float
     name: str
     kind: str
     flips: int
     of: int
     mu_star: float
     alone: int
-
-    @property
-    def share(self) -> float:
-        """The share of trajectories."""
-        return self.flips / self.of if self.of else 0.0
 
 
 def sensitivity_of(
@@ -138,7 +133,7 @@ def sensitivity_of(
     seed = run.settings.seed if seed is None else seed
     rows, chosen = run.rows(), list(titles)[:taken]
     bench = _Bench(
-        pipeline, rows.X[chosen], constants, moving, lambda n: (progress or _quiet)(n, total)
+        pipeline, rows.X[chosen], constants, moving, lambda n: progress and progress(n, total)
     )
     bench.sweep()
     points, order = record.design(trajectories, factors, seed)
@@ -151,10 +146,7 @@ def sensitivity_of(
         trajectories=trajectories,
         radius=RADIUS,
         evaluations=bench.done,
-        constants=tuple(
-            Varied(**{name: getattr(one, name) for name in Varied.model_fields})
-            for one in constants
-        ),
+        constants=constants,
         not_varied=NOT_VARIED,
         findings=tuple(
             bench.finding(f, evaluation, titles[evaluation], points, order)
@@ -166,10 +158,6 @@ def sensitivity_of(
     record.write_record(run.folder / JSON_FILE, found)
     _write_page(run.folder / PAGE, found)
     return found
-
-
-def _quiet(done: int, total: int) -> None:
-    """Show nothing."""
 
 
 def _findings(run: Run) -> dict[int, str]:
@@ -319,14 +307,12 @@ def shares(found: Sensitivity) -> list[Share]:
     for finding in found.findings:
         for effect in finding.effects:
             of.setdefault((effect.kind, effect.name), []).append(effect)
-    moved = [
-        Share(
-            name, kind, sum(one.flips for one in some), sum(one.of for one in some),
-            sum(one.mu_star for one in some) / len(some),
-            sum(one.at_least is not None or one.at_most is not None for one in some),
-        )
-        for (kind, name), some in of.items()
-    ]  # fmt: skip
+    moved = []
+    for (kind, name), some in of.items():
+        flips, tried = (sum(getattr(one, n) for one in some) for n in ("flips", "of"))
+        mu_star = sum(one.mu_star for one in some) / len(some)
+        alone = sum(one.at_least is not None or one.at_most is not None for one in some)
+        moved.append(Share(flips / max(tried, 1), name, kind, flips, tried, mu_star, alone))
     return sorted(moved, key=lambda one: (-one.share, -one.alone, -one.mu_star, one.name))
 
 
