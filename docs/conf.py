@@ -16,7 +16,7 @@ copyright = "The BridgeGen developers, Apache-2.0"
 version = release = version_of("bridgegen")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-exclude_patterns = ["examples", "generated/weather.md"]
+exclude_patterns = ["examples", "generated/weather.md", "generated/constants.md"]
 
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist"]
 myst_heading_anchors = 3

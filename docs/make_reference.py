@@ -12,6 +12,7 @@ from typer.main import get_command
 
 from bridgegen.cli import app
 from bridgegen.cli.groups import DEFAULT
+from bridgegen.engine.constants import CONSTANTS, NOT_VARIED
 from bridgegen.scenario.language.json_schema import schema, schema_text
 from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.language.reader import load
@@ -26,6 +27,7 @@ def write(folder: Path) -> None:
         ("command-line.md", command_line()),
         ("scenario-files.md", scenario_files()),
         ("weather.md", weather()),
+        ("constants.md", constants()),
         ("bridgegen.schema.json", schema_text()),
     ):
         path = folder / name
@@ -108,6 +110,18 @@ def weather() -> str:
         f"- `{rule}`\\\n  {cell(why)}\\\n  *Source:* {cell(source)}\n"
         for rule, why, source in rules
     )
+
+
+def constants() -> str:
+    """Return the table of constants that can be varied, and the list of those that are not."""
+    rows = "\n".join(
+        f"| `{one.name}` | {cell(one.words)} | {one.value:.4g} | {one.low:g} to {one.high:g} | "
+        f"{one.unit} | {cell(one.influences)} | {cell(one.source)} |"
+        for one in CONSTANTS
+    )
+    head = "| name | constant | nominal | plausible | unit | influences | source |\n" + "|---" * 7
+    others = "".join(f"- {cell(what)}: {cell(why)}\n" for what, why in NOT_VARIED.items())
+    return f"{head}|\n{rows}\n\nNot varied:\n\n{others}"
 
 
 def title(name: str) -> str:

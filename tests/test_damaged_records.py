@@ -15,6 +15,7 @@ from tests.approval import refuses
 import bridgegen as bg
 from bridgegen.assess.objective import Objective
 from bridgegen.base.errors import BridgeGenError
+from bridgegen.engine.constants import Constant
 from bridgegen.engine.options import CommonOptions
 from bridgegen.jobs.compare.plan import begin, make_plan
 from bridgegen.jobs.search.exported import exported_scenarios, not_exported, read_facts
@@ -23,6 +24,8 @@ from bridgegen.results.confirmation.record import read_record as read_confirmati
 from bridgegen.results.store import Store
 from bridgegen.scenario.language.thresholds import Thresholds
 from bridgegen.search.regions.record import read_record as read_regions
+from bridgegen.search.sensitivity import Effect, Finding, Sensitivity
+from bridgegen.search.sensitivity import read_record as read_sensitivity
 from bridgegen.search.triage.record import read_record as read_triage
 
 MARK = "the value that is damaged"
@@ -78,6 +81,23 @@ CONFIRMATION = Record(
     objectives=("d_min", "v_d"),
     scenarios=(Scenario(evaluation=2, name="0001", row="0" * 16, here=HERE, failure="no road"),),
 )  # fmt: skip
+SENSITIVITY = Sensitivity(
+    scenario="cut-in", ego="reference", results="0" * 64, seed=1, trajectories=4, radius=0.025,
+    evaluations=500, left_out=1, not_varied={"wheelbase": "paths lead the rear axle"},
+    constants=(
+        Constant("a", "the a", 1.0, "s", 0.5, 2.0, "b", "c"),
+    ),
+    findings=(
+        Finding(
+            evaluation=3, title="collides", conflict="contact", harm=0.5, sentences=("stands",),
+            effects=(
+                Effect(
+                    name="a", kind="constant", mu_star=0.1, sigma=0.2, flips=1, of=4, at_most=1.5
+                ),
+            ),
+        ),
+    ),
+)  # fmt: skip
 REFUSED = [{"name": "0002", "evaluation": 3, "problems": ["no such lane"]}]
 
 
@@ -96,6 +116,7 @@ def run(tmp_path_factory):
         causes=False,
     )
     (folder / "regions.json").write_text(json.dumps(REGIONS), "utf-8")
+    (folder / "sensitivity.json").write_text(SENSITIVITY.model_dump_json(), "utf-8")
     (folder / "not-exported.json").write_text(json.dumps(REFUSED), "utf-8")
     (folder / "confirmation-esmini.json").write_text(CONFIRMATION.model_dump_json(), "utf-8")
     with Store.open(folder) as store:
@@ -146,6 +167,7 @@ READERS = {
     "triage.json": read_triage,
     "regions.json": read_regions,
     "confirmation-esmini.json": read_confirmation,
+    "sensitivity.json": lambda path: read_sensitivity(path, "0" * 64),
     "not-exported.json": lambda path: not_exported(path.parent),
     "critical/0001.json": lambda path: (
         exported_scenarios(path.parent.parent, 60),
@@ -232,7 +254,9 @@ def test_what_is_no_record_is_one_error(run, name, text):
         path.write_bytes(whole)
 
 
-@pytest.mark.parametrize("name", ["triage.json", "regions.json", "confirmation-esmini.json"])
+@pytest.mark.parametrize(
+    "name", ["triage.json", "regions.json", "confirmation-esmini.json", "sensitivity.json"]
+)
 def test_what_never_ends_is_refused(tmp_path, name):
     """A link to a device, as a folder from a stranger may hold one."""
     (tmp_path / name).symlink_to("/dev/zero")

@@ -12,6 +12,7 @@ from tests.approval import approve, refuses
 
 import bridgegen
 from bridgegen.cli import main
+from bridgegen.engine.constants import CONSTANTS, NOT_VARIED
 from bridgegen.scenario.language.reader import load, names
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -271,6 +272,10 @@ def test_pages_that_are_made_of_the_code_can_be_made(tmp_path):
     assert "| **`template`** | `crossroads`, `t-junction`" in keys
     assert "| `to` | text | Other participant" in keys
     assert "cloudiness ≥ precipitation" in (tmp_path / "weather.md").read_text("utf-8")
+    constants = (tmp_path / "constants.md").read_text("utf-8")
+    for one in CONSTANTS:
+        assert f"| `{one.name}` | {one.words} | {one.value:.4g} |" in constants
+    assert all(f"- {what}: " in constants for what in NOT_VARIED)
 
 
 def test_the_sections_of_a_report_are_called_as_the_page_calls_them():

@@ -78,7 +78,8 @@ COARSE = {
 
 AS_PRINTED = (
     "estimate-risk", "failure-modes", "mine-recordings", "python-guide", "regions", "run-a-suite",
-    "safety-case", "search-a-file", "team", "test-my-driver", "tutorial", "write-a-scenario",
+    "safety-case", "search-a-file", "sensitivity", "team", "test-my-driver", "tutorial",
+    "write-a-scenario",
 )  # fmt: skip
 """Pages whose commands are run exactly as they are printed, and whose output is compared."""
 

@@ -142,6 +142,44 @@ def regions(
     print_regions(found, as_json=as_json)
 
 
+@analyses.command()
+def sensitivity(
+    run: Annotated[Path, typer.Argument(help="The folder of a finished run.")],
+    findings: Annotated[int, typer.Option(help="Findings that are analysed, at most.")] = 20,
+    trajectories: Annotated[
+        int, typer.Option(help="Trajectories of Morris's design, at least 2.")
+    ] = 4,
+    budget: Annotated[int, typer.Option(help="Number of evaluations, at most.")] = 10_000,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of the trajectories.", show_default="the run's")
+    ] = None,
+    ego: options.OwnEgo = None,
+    metrics: options.OwnMetrics = None,
+    as_json: options.Json = False,
+) -> None:
+    """Find constants of the models that the verdicts of a run hang on.
+
+    Reaction times, friction, sizes, thresholds: each is moved within its plausible range, alone
+    and together with all others and the scenario's parameters.
+    """
+    from bridgegen.cli.terminal.sensitivity import SensitivityProgress, print_sensitivity
+    from bridgegen.jobs.search.sensitivity import sensitivity_of
+
+    with SensitivityProgress() as live:
+        found = sensitivity_of(
+            run,
+            findings=findings,
+            trajectories=trajectories,
+            budget=budget,
+            seed=seed,
+            ego=ego,
+            metrics=read_names(metrics),
+            say=live.say,
+            progress=live.progress,
+        )
+    print_sensitivity(run, found, as_json=as_json)
+
+
 @app.command()
 @with_map_folder()
 @with_connection_options

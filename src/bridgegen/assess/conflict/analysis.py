@@ -1,5 +1,6 @@
 """The conflict analysis of rollouts: conflicts of the ego with each other participant."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -166,12 +167,23 @@ def _with_violations(rollout: Rollout) -> Conflicts:
     return with_violations(rollout, encounters(rollout))
 
 
-def _analyse(rollout: Rollout) -> Conflicts:
+def analyse_by(rollout: Rollout, kernel: Callable[..., None]) -> Conflicts:
+    """Analyse a rollout, and whatever is derived of it from now on, by another kernel.
+
+    Args:
+        rollout: not analysed yet.
+        kernel: takes what ``_conflict_kernels.analyse_rows`` does, and fills what that does.
+    """
+    rollout.derived[_analyse] = _analyse(rollout, kernel)
+    return analyse(rollout)
+
+
+def _analyse(rollout: Rollout, kernel: Callable[..., None] | None = None) -> Conflicts:
     own = [e for e in range(rollout.shape[1]) if rollout.is_ego_s(e)]
     if len(own) == 1:
-        return _of_one_body(rollout)
+        return _of_one_body(rollout, kernel)
     # Of a tractor and its trailers the worst conflict counts, of two contacts the earlier one.
-    found, *more = (_of_one_body(_seen_from(rollout, e, own)) for e in own)
+    found, *more = (_of_one_body(_seen_from(rollout, e, own), kernel) for e in own)
     for e, part in zip(own[1:], more, strict=True):
         worse = part.kind > found.kind
         worse |= (part.kind == found.kind) & (part.kind == CONTACT) & (part.instant < found.instant)
@@ -207,7 +219,7 @@ def _seen_from(rollout: Rollout, e: int, own: list[int]) -> Rollout:
     )
 
 
-def _of_one_body(rollout: Rollout) -> Conflicts:
+def _of_one_body(rollout: Rollout, kernel: Callable[..., None] | None) -> Conflicts:
     from bridgegen.assess.conflict import _conflict_kernels as kernels
 
     n, e, t = rollout.shape
@@ -229,7 +241,7 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
     real[:, :, codes.TTC] = np.inf
     potential, severity, changes = np.zeros((n, e)), np.zeros((n, e)), np.zeros((n, e, 2))
     reverses = np.zeros((n, 0, 0), np.bool_) if moving.reverses is None else moving.reverses
-    kernels.analyse_rows(
+    (kernel or kernels.analyse_rows)(
         ~ok, moving.half, np.ascontiguousarray(kinds, dtype=np.int64), moving.x, moving.y,
         moving.cosine, moving.sine, moving.v, moving.a, recorded(rollout, "offset"),
         moving.distance, moving.n_steps, rollout.time_step,

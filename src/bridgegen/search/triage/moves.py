@@ -73,12 +73,12 @@ def around(space: SearchSpace, x: Float, seed: int, number: int, n: int, radius:
         ``(2, n, len(space.names))``, feasible.
     """
     random = np.random.Generator(np.random.PCG64([seed, _STREAM, number]))
-    by = (2.0 * random.random((2, n, space.n_var)) - 1.0) * radius * _reaches(space)
+    by = (2.0 * random.random((2, n, space.n_var)) - 1.0) * radius * reaches(space)
     first = nearest(space, searched(space, x[np.newaxis]) + by[0])
     return np.stack([first, nearest(space, searched(space, first) + by[1])])
 
 
-def _reaches(space: SearchSpace) -> Float:
+def reaches(space: SearchSpace) -> Float:
     """Return the range of which each searched parameter of a neighbour moves by a share."""
     parameters = (space.parameters[name] for name in space.variables)
     return np.array(
