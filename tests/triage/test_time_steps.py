@@ -25,6 +25,11 @@ def at(steps: int, conflict: str = "contact", *, harmful: bool = True, ok: bool 
         ([at(2), at(4)], True, ""),
         ([at(2), at(4, "near miss")], False, "contact at 0.05 s, near miss at 0.0125 s"),
         ([at(2, "", harmful=False), at(4)], False, "contact at 0.05 s, no conflict at 0.025 s"),
+        (
+            [at(2, harmful=False)],
+            False,
+            "contact at 0.05 s, contact that does not count at 0.025 s",
+        ),
         ([at(2, ok=False, harmful=False)], False, "contact at 0.05 s, no result at 0.025 s"),
     ],
 )

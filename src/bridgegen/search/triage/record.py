@@ -236,6 +236,8 @@ class StepCheck(_Model):
 def _kind(one: AtStep) -> str:
     if not one.ok:
         return "no result"
+    if one.conflict in ("contact", "near miss") and not one.harmful:
+        return f"{one.conflict} that does not count"
     return one.conflict or "no conflict"
 
 
