@@ -108,3 +108,19 @@ def test_records_without_checks_are_read(tmp_path):
     run = bg.run_search("crossroads-s4", budget=40, keep=1, triage="none", out=tmp_path / "run")
     assert run.triage.step_checks == ()
     assert steps_in_words(run.triage) == ""
+
+
+def test_what_only_a_finer_step_shows_is_said_without_being_asked(space, world):
+    """A run without failures is no plain all-clear where its sample fails at half the step."""
+    from bridgegen.cli.terminal.search import _found_lines
+
+    pipeline = world(space, lambda v, fix: np.zeros(len(v["ego_speed"])))
+    pipeline.at_step = lambda v, n, harm: np.where((v["ego_speed"] >= 8.0) & (n == 2), 0.8, harm)
+    rows = pipeline.rows(400)
+    record = triage(pipeline, rows, algorithm="random", seed=0, keep=6).record
+    assert record.modes == ()
+    assert 0 < record.missed < 24
+    kept = f"{24 - record.missed} of 24 evaluations without failure keep their verdict"
+    assert f"Time step: {kept} at time steps of" in _found_lines(record)[-1]
+    calm = record.model_copy(update={"step_checks": record.step_checks[:0]})
+    assert not any(line.startswith("Time step") for line in _found_lines(calm))

@@ -97,6 +97,7 @@ def triage_payload(found: Triage) -> dict[str, Any]:
             for influence in found.influences
         ],
         "steps": steps_in_words(found),
+        "missed": found.missed,
         "judged": _judged(found),
         "bound": {
             "sentence": found.bound.in_full,

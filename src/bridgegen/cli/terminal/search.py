@@ -242,7 +242,7 @@ def _mode_lines(found: "Triage") -> list[str]:
 
 def _found_lines(found: "Triage") -> list[str]:
     """Return how common failures are, the simplest one, what matters, and what does not count."""
-    from bridgegen.search.triage.words import parameters_in_words
+    from bridgegen.search.triage.words import parameters_in_words, steps_in_words
 
     space, lines = found.bound.space, []
     if found.bound.judged and space.drawn and space.rows:
@@ -262,6 +262,8 @@ def _found_lines(found: "Triage") -> list[str]:
         lines.append(f"What matters most: {text}")
     if found.bound.not_counted:
         lines.append(f"N{found.bound.not_counted[1:]}")
+    if found.missed:
+        lines.append(f"Time step: {steps_in_words(found)}")
     return lines
 
 

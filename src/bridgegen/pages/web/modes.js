@@ -33,7 +33,7 @@ class Modes {
     $("modes-lead").textContent = capital(found.bound.sentence.replace(n ? /^.*? fails in [\d,]+ ways?: / : /^(Not judged: |No (failure found|scenario in which .*? was found) in )/, "")); // the title says the rest
     const kind = n || found.bound.failures ? "fails" : found.bound.judged === false ? "open" : data.criteria ? "" : "passes";
     // Not green where careful drivers avoid collisions that do not count: the sentence says so after "but".
-    $("verdict").className = `banner ${kind === "passes" && found.bound.sentence.includes(", but ") ? "open" : kind}`;
+    $("verdict").className = `banner ${kind === "passes" && (found.missed || found.bound.sentence.includes(", but ")) ? "open" : kind}`;
     $("verdict-word").textContent = { fails: "FAILS", open: "NOT JUDGED", passes: "NO FAILURE FOUND", "": "" }[kind];
     $("modes-title").classList.toggle("hidden", $("modes-title").textContent.toUpperCase() === $("verdict-word").textContent);
     $("verdict-next").textContent = kind === "fails" ? data.summary.next : "";

@@ -546,6 +546,14 @@ class Triage(_Model):
         return next((item for item in self.step_checks if item.evaluation == evaluation), None)
 
     @property
+    def missed(self) -> int:
+        """How many of the evaluations without failure that were checked fail at a finer step."""
+        return sum(
+            not check.at[0].harmful and any(one.harmful for one in check.at)
+            for check in self.step_checks
+        )
+
+    @property
     def robust(self) -> int:
         """How many modes are not knife-edge; those that were not tested count."""
         return sum(not mode.knife_edge for mode in self.modes)
