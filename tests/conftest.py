@@ -16,6 +16,7 @@ import pytest
 from hypothesis import settings
 from tests.approval import Approval
 
+from bridgegen.assess.metrics import registry
 from bridgegen.base.processes.child import ONE_THREAD, collect_rarely
 
 CHECKERS = "BRIDGEGEN_CHECKERS"
@@ -90,6 +91,15 @@ def sort_by_file(items: list[Any]) -> None:
     longest = {Path(__file__).parent / name: len(LONGEST) - k for k, name in enumerate(LONGEST)}
     number = Counter(item.path for item in items)
     items.sort(key=lambda item: (longest.get(item.path, 0), number[item.path]), reverse=True)
+
+
+@pytest.fixture(autouse=True)
+def forgotten_metrics() -> Iterator[None]:
+    """Forget the metrics that a test reads from a file: other tests list those that are known."""
+    yield
+    for name in [*registry._NAMED]:
+        registry._NAMED.remove(name)
+        del registry.METRICS[name]
 
 
 @pytest.fixture(scope="session")

@@ -28,15 +28,6 @@ NUMBER = 3
 OPTIONS = {"ego": "route-follower", "algorithm": "random", "triage": "none", "keep": 0}
 
 
-@pytest.fixture(autouse=True)
-def forgotten():
-    """Forget the metrics that a test reads: other tests list those that are known."""
-    yield
-    for name in [*registry._NAMED]:
-        registry._NAMED.remove(name)
-        del metrics.METRICS[name]
-
-
 @pytest.fixture
 def own(tmp_path):
     path = tmp_path / "met.py"
