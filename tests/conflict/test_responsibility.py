@@ -188,9 +188,7 @@ def test_who_steps_out_does_not_depend_on_where_the_samples_fall(track, meeting)
         y = 3.0 * np.minimum(DT * np.arange(121) - 4.0 + later, 0.0)
         walker = {**track(h=RIGHT_ANGLE, v=np.where(y < 0.0, 3.0, 0.0)), "x": np.zeros(121), "y": y}
         boxes = [(4.0, 2.0, 0.0), MAN]
-        return at_fault(
-            meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=boxes, crosswalks=walk)
-        )
+        return at_fault(meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=boxes, crosswalks=walk))
 
     needed = [excused_up_to(partial(met, later=later), 1.0 / 25.0, 1.0 / 8.0) for later in LATER]
     assert max(needed) / min(needed) - 1.0 < 0.002
