@@ -120,11 +120,11 @@ def braked_and_stood(scene, a, b, k, start, braking, stands):
     ``start`` may lie between two instants: a body that comes into sight within a step was once seen
     up to a step late, and in cut-out 5 of 402 failures were excused as revealed late at 0.05 s, and
     not at 0.025 s. It keeps its motion for ``REACTION``; then its deceleration rises by ``JERK`` up
-    to ``braking`` [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its
-    speed on its track. A body that stands when b runs into it counts as clear: braking cannot do
-    more; unless it ``stands`` in the way of b, which must have stopped before it then. One that
-    crosses b's way and is ahead of its recorded place when they meet is not clear: it has escaped
-    by not braking.
+    to ``braking`` [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``,
+    then keeps its speed on its track. A body that stands when b runs into it counts as clear:
+    braking cannot do more; unless it ``stands`` in the way of b, which must have stopped before it
+    then. One that crosses b's way and is ahead of its recorded place when they meet is not clear:
+    it has escaped by not braking.
     """
     half, x, y, c, s, v, gone = (
         scene.half,

@@ -298,7 +298,8 @@ def decide(
     """Return the responsible party, and the rule.
 
     The other has been visible in the ego's way from ``early`` steps before ``risk`` on, a danger
-    from ``since`` on, and stands from ``stands`` on (k + 1: it moves); ``late``: it was hidden before ``risk``.
+    from ``since`` on, and stands from ``stands`` on (k + 1: it moves); ``late``: it was hidden
+    before ``risk``.
     """
     # The order of these rules is that of the table in docs/conflicts.md: the first that applies
     # decides.

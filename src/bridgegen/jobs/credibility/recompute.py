@@ -69,18 +69,13 @@ def of_run(run: dict[str, Any], folder: Path) -> dict[str, Any]:
 
     triage = json.loads((folder / "triage.json").read_text("utf-8"))
     checks = [(item["evaluation"], item["at"]) for item in triage.get("step_checks", [])]
-    steps = [item["time_step"] for item in triage.get("step_checks", [])]
+    for item in triage.get("step_checks", []):
+        item["at"][0]["finest"] = item["time_step"] / 8
     where = {"evaluations": "1", "drawn": "1", "failed": "status != 0", "drawn_known": FIT}
     where |= {"drawn_harmful": f"{FIT} AND {harm} >= 0.3{' AND critical' * bool(cause)}"}
     found = {name: ask("count(*)", text) for name, text in where.items()}
     found["same"] = sum(ask(harm, f"id = {row:d}") == at[0]["harm"] for row, at in checks)
-    found |= {
-        "folder": folder,
-        "version": about["version"],
-        "checks": checks,
-        "steps": steps,
-        "runs": 1,
-    }
+    found |= {"folder": folder, "version": about["version"], "checks": checks, "runs": 1}
     found |= {"checked": len(checks), "distributions": distribution is not None}
     found["sensitivity"] = (folder / "sensitivity.json").is_file()
     edges = [names[4 + about["parameters"].index(name)] for name in run["edges"]]
@@ -107,16 +102,14 @@ def state(one: dict[str, Any]) -> tuple[Any, ...]:
     return one["ok"], one["harmful"], one["conflict"] if one["harmful"] else ""
 
 
-def errors(at: list[dict[str, Any]], of: str, step: float) -> dict[str, Any] | None:
+def errors(at: list[dict[str, Any]], of: str) -> dict[str, Any] | None:
     """Return errors at dt: against dt/8, extrapolated (Richardson), Roache's index, stated."""
     some = {one["steps"]: one for one in at if one["ok"] and one["steps"] in (1, 2, 4, 8)}
     kinds = {one["conflict"] for one in some.values()}
     q: list[Any] = [some[steps].get(of) for steps in sorted(some)]
-    if (
-        len(q) < 4
-        or None in q
-        or (of in ("time", "place", "speed") and (len(kinds) > 1 or kinds == {""}))
-    ):
+    if of in ("time", "place", "speed") and (len(kinds) > 1 or kinds == {""}):
+        return None
+    if len(q) < 4 or None in q:
         return None
     q = [complex(*one) if of == "place" else one for one in q]
     before, last = q[1] - q[2], q[2] - q[3]
@@ -125,7 +118,7 @@ def errors(at: list[dict[str, Any]], of: str, step: float) -> dict[str, Any] | N
     power = order if order is not None and 0.5 <= order <= 2 else 0
     off = abs(q[0] - (q[3] - last / (2 ** (power or 1) - 1)))
     found = {"error": abs(q[0] - q[3]), "extrapolated": off, "gci": off * (1.25 if power else 3)}
-    fine = {"time": step / 8, "place": step / 8 * (at[0].get("speed") or 0)}.get(of, 0)
+    fine = at[0]["finest"] * {"time": 1, "place": at[0].get("speed") or 0}.get(of, 0)
     found["stated"] = 1.25 * max(abs(a - b) for a in q for b in q) + fine
     return found | {"q": q, "order": order}
 
@@ -152,9 +145,7 @@ def of_all(name: str, of: str, runs: list[dict[str, Any]], files: int) -> Any:
         return ways.get(name.partition("_")[2], len(some))
     if name in ("files", "versions"):
         return files if name == "files" else len({run["version"] for run in runs})
-    steps = [step for run in runs for step in run["steps"]]
-    tried = [errors(at, of, step) for at, step in zip(checks, steps) if at[0]["harmful"]]
-    made = [one for one in tried if one is not None]
+    made = [one for one in (errors(at, of) for at in some) if one is not None]
     if name == "unchanged":
         return sum(len(set(one["q"])) == 1 for one in made)
     kind, _, part = {"orders": "order", "series": "q"}.get(name, name).partition("_")
