@@ -89,7 +89,8 @@ _ERROR = (
     "from Richardson's extrapolation to a step of 0, by the order observed at the three finest "
     "steps where it is 0.5 to 2, else by the first order, which the scheme promises (triggers, "
     "drivers and contacts act at instants). Times Roache's factor of safety (1998), 1.25 or 3, it "
-    "is his grid convergence index."
+    "is his grid convergence index. Stated is 1.25 times the widest difference of two of the four, "
+    "and of time and place what dt/8 resolves: it is to hold of a single finding."
 )
 
 
@@ -103,7 +104,8 @@ def _error(number: str, quantity: str, title: str, unit: str) -> Asked:
         f"|q(dt) − q(dt/8)|: median {of('error_median')}{unit}, 95 % quantile {of('error_q95')}"
         f"{unit}, of {of('series')} findings. Extrapolated to a step of 0: median "
         f"{of('extrapolated_median')}{unit}, 95 % quantile {of('extrapolated_q95')}{unit}; grid "
-        f"convergence index, 95 % quantile {of('gci_q95')}{unit}.",
+        f"convergence index, 95 % quantile {of('gci_q95')}{unit}. Stated: median "
+        f"{of('stated_median')}{unit}, 95 % quantile {of('stated_q95')}{unit}.",
         how=_ERROR if quantity == "time" else "As 6.3.",
         again=_AGAIN,
         needs=(f"error_q95:{quantity}",),
@@ -204,9 +206,11 @@ ASKED: tuple[Asked, ...] = (
            "A sample, evenly spread over each run. Clopper and Pearson (1934), for independent "
            "draws; evaluations of an optimiser are not independent."),
     _error("6.3", "time", "time of the conflict", " s"),
-    _error("6.4", "harm", "harm", ""),
-    _error("6.5", "severity", "severity", ""),
-    Asked("6.6", "Repeatability", "{all.same} of {all.checked} evaluations that were simulated "
+    _error("6.4", "place", "place of the conflict", " m"),
+    _error("6.5", "speed", "speed of the ego", " m/s"),
+    _error("6.6", "harm", "harm", ""),
+    _error("6.7", "severity", "severity", ""),
+    Asked("6.8", "Repeatability", "{all.same} of {all.checked} evaluations that were simulated "
           "again at the scenario's step have the harm of run.sqlite, to the last bit.",
           how="step_checks of triage.json against run.sqlite.", again=_AGAIN, needs=("same",),
           gap="No evaluation was simulated again", fill=_FULL, sources=("17025", *COMMON)),

@@ -184,7 +184,9 @@ class AtStep(_Model):
         harmful: whether it is a failure.
         harm: 0 where there is no result.
         severity: probability of MAIS3+ in the ego's collision.
-        time: of the decisive conflict [s]; None where there is none.
+        time: of the decisive conflict [s]; None where there is none, like the next two.
+        place: of the ego's front in that conflict [m].
+        speed: of the ego then [m/s].
         conflict: its kind; "" where there is none.
     """
 
@@ -194,6 +196,8 @@ class AtStep(_Model):
     harm: Share
     severity: Share
     time: Number | None = None
+    place: tuple[Number, Number] | None = None
+    speed: Number | None = None
     conflict: Text = ""
 
 
