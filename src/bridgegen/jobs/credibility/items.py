@@ -219,8 +219,18 @@ ASKED: tuple[Asked, ...] = (
           again=_CONFIRM, needs=("confirmed:1",), gap=_UNCONFIRMED, fill=_CONFIRM),
     Asked("8.2", "Recordings", needs=("recorded",), gap="Recorded events are not replayed beside "
           "their parameterised twins; no command of this version does so"),
-    Asked("8.3", "Proving ground", "Which results of a proving ground or of road tests were "
-          "compared, by which measure and threshold?", form="proving_ground"),
+    Asked("8.3", "Real tests: area metric", "{all.tests} tests in {all.comparisons} comparisons: "
+          "{all.accepted} within the threshold, {all.refused} not, {all.undecided} not decided, "
+          "{all.without} without a threshold, {all.valueless} without a simulated value.",
+          how="Area between the two empirical distributions (Ferson, Oberkampf and Ginzburg, 2008; "
+          "ASME V&V 20 and 10; not read for this). Interval: bootstrap over tests from 6 on, "
+          "widened by the mean stated uncertainty. Accepted: its upper end is at most the "
+          "threshold.", again=RECOMPUTE, needs=("comparisons",), sources=(*COMMON, "17025"),
+          gap="No result of a proving ground or a road test is compared: measured.csv has none",
+          details=("Comparisons of fewer than 6 tests, whose intervals leave chance out: "
+                   "{all.few}.",)),
+    Asked("8.4", "Proving ground: how it was measured", "Which results of a proving ground or of "
+          "road tests were compared, by which measure and threshold?", form="proving_ground"),
     Asked("9.1", "Sampling", "The harmful share of each searched space, with its interval.",
           how="Random draws; Clopper and Pearson (1934), rounded outwards.", again=RECOMPUTE,
           needs=("shares",), gap="No run estimates the harmful share of its space", fill=_RANDOM),

@@ -75,6 +75,36 @@ class Flip(_Model):
     text: str
 
 
+Verdict = Literal[
+    "accepted", "not accepted", "not decided", "no threshold", "no simulated value"
+]  # fmt: skip
+"""Verdict on a comparison: its interval is below the threshold, above it, or holds it."""
+
+
+class Comparison(_Model):
+    """Real tests beside the simulation of the same scenarios; figures are numbers of the dossier.
+
+    Attributes:
+        run: its id.
+        series: what is compared together.
+        quantity: name of the metric.
+        unit: of it.
+        tests: how many.
+        evaluations: that were tested, from 1.
+        threshold: greatest area that people accept; None if they state none.
+        verdict: on the area.
+    """
+
+    run: str
+    series: str
+    quantity: str
+    unit: str
+    tests: int
+    evaluations: tuple[int, ...]
+    threshold: float | None
+    verdict: Verdict
+
+
 class Dossier(_Model):
     """A credibility dossier.
 
@@ -91,6 +121,7 @@ class Dossier(_Model):
         numbers: every number in the texts.
         items: in the order of the chapters.
         flips: what depends on the time step.
+        comparisons: with real tests.
         gaps: everything that is missing.
         installed: installed distributions with their versions.
         evidence: the files that the numbers are of.
@@ -108,6 +139,7 @@ class Dossier(_Model):
     numbers: tuple[Number, ...]
     items: tuple[Item, ...]
     flips: tuple[Flip, ...]
+    comparisons: tuple[Comparison, ...] = ()
     gaps: tuple[Gap, ...]
     installed: dict[str, str]
     evidence: tuple[Evidence, ...]
@@ -126,4 +158,5 @@ class Dossier(_Model):
             "findings": float(value.get("all.findings", 0)),
             "flips": sum(flips),
             "sample_flips": len(flips) - sum(flips),
+            "refused": float(value.get("all.refused", 0)),
         }
