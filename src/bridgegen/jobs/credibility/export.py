@@ -19,11 +19,12 @@ from bridgegen.jobs.credibility.figures import EVERY, SENSITIVITY, flips, instal
 from bridgegen.jobs.credibility.form import FILE as FORM_FILE
 from bridgegen.jobs.credibility.form import read_form, write_form
 from bridgegen.jobs.credibility.items import ASKED, CHAPTERS, SOURCES, Asked
-from bridgegen.jobs.credibility.measured import FEWEST, compare, read_measured, write_template
+from bridgegen.jobs.credibility.measured import FEWEST, TEMPLATE, compare, read_measured
 from bridgegen.jobs.credibility.measured import FILE as MEASURED
 from bridgegen.jobs.credibility.model import FILE, Dossier, Gap, Item
 from bridgegen.jobs.credibility.options import CredibilityOptions
 from bridgegen.jobs.credibility.page import GENERATOR, PAGE, page, worst
+from bridgegen.jobs.credibility.region import regions, warning
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.safety_case.context import assumptions
 from bridgegen.jobs.safety_case.facts import Facts, Files, read_facts, run_facts
@@ -32,10 +33,12 @@ from bridgegen.jobs.safety_case.numbers import RUN, TRIAGE, Numbers, statement
 from bridgegen.jobs.search.exported import FOLDER as SCENARIOS
 from bridgegen.jobs.view.overview import MOST_RUNS, find_folders
 from bridgegen.results.confirmation.record import PREFIX, SUFFIX
+from bridgegen.results.validated import FILE as VALIDATED
+from bridgegen.results.validated import Validated
 
 FOLDER, SCRIPT, GAPS = "dossier", "recompute.py", "gaps.txt"
 
-Details = Mapping[str, Sequence[str]]
+Details = dict[str, Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,11 @@ def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
             of_run.add(path, "which constants of the models its verdicts depend on", "")
         evidence += of_run.all
     numbers, more = measure(runs), Numbers(EVERY)
-    comparisons = compare(read_measured(out, runs), more)
+    tests = read_measured(out, runs)
+    comparisons = compare(tests, more)
+    validated = regions(runs, tests, comparisons)
+    if validated:
+        more.add("regions", len(validated), source=VALIDATED)
     if comparisons:
         of_run.add(out / MEASURED, "results of real tests", "")
         evidence.append(of_run.all[-1])
@@ -137,6 +144,16 @@ def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
     more.add("files", len(evidence), source=FILE)
     numbers |= {number.id: number for number in more.all}
     details = _added(runs, numbers, different)
+    spans = [
+        f"{_plain(one.scenario)}, vehicle {one.vehicle}, {_plain(one.evidence)}: "
+        + _plain("; ".join(map(one.side, one.ranges)) + ".")
+        for one in validated
+    ]
+    details["10.2"] = spans + [
+        f"{name}: {_plain(said)}."
+        for name, one in runs.items()
+        if (said := warning(one, validated))
+    ]
     notes = _notes(found, numbers, rows=rows)
     if any(one.verdict != "accepted" or one.tests < FEWEST for one in comparisons):
         notes["8.3"] = "not all are accepted, from 6 tests or more"
@@ -174,6 +191,7 @@ def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
         items=items,
         flips=tuple(flips(runs)),
         comparisons=tuple(comparisons),
+        validated=tuple(validated),
         gaps=(*found.gaps, *of_items),
         installed=distributions,
         evidence=tuple(evidence),
@@ -363,9 +381,12 @@ def export_credibility(given: CredibilityOptions) -> Exported:
     except OSError as error:
         raise StorageError(f"{out}: cannot be written: {error.strerror}") from None
     write_form(out)
-    write_template(out)
+    if not (out / MEASURED).exists():
+        write_whole(out / MEASURED, [TEMPLATE.encode()])
     data = dossier.model_dump_json(indent=1).encode("utf-8", "replace") + b"\n"
     write_whole(out / FILE, [data])
+    regions_data = Validated(regions=dossier.validated).model_dump_json(indent=1).encode()
+    write_whole(out / VALIDATED, [regions_data, b"\n"])
     write_whole(out / PAGE, [page(dossier, data)])
     lines = [f"{gap.place}: {gap.why}" + f" [{gap.command}]" * bool(gap.command) + "\n"
              for gap in dossier.gaps]  # fmt: skip

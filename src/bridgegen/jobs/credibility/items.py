@@ -262,6 +262,14 @@ ASKED: tuple[Asked, ...] = (
           "parameters hold an evaluation.", again="bridgegen analyse coverage RUN",
           how="Each parameter's range in bins; one that constraints exclude counts, too.",
           note="one parameter at a time; outside the ranges nothing is claimed"),
+    Asked("10.2", "Validated region", "Scenarios with a region in which there is evidence: "
+          "{all.regions}. Beyond a region, figures of its runs are extrapolated.",
+          how="Least and greatest value of each numeric parameter in "
+          "rows that are confirmed in another simulator, or accepted beside a real test; not "
+          "every point between them is.", again=RECOMPUTE, needs=("regions",), fill=_CONFIRM,
+          note="rows span a region, and do not fill it",
+          gap="No region is validated: no row is confirmed in another simulator, or accepted "
+          "beside a real test, so each result is an extrapolation"),
     Asked("11.1", "Each run again", "Commands with seeds make {all.runs} runs again; the list of "
           "runs has them.", how="Settings in run.sqlite.", again="the commands of the list",
           sources=(*COMMON, "17025")),

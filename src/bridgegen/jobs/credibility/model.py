@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from bridgegen.jobs.safety_case.model import Evidence, Number, RunFacts, Statement
+from bridgegen.results.validated import Region
 
 FILE = "credibility.json"
 
@@ -90,7 +91,6 @@ class Comparison(_Model):
         quantity: name of the metric.
         unit: of it.
         tests: how many.
-        evaluations: that were tested, from 1.
         threshold: greatest area that people accept; None if they state none.
         verdict: on the area.
     """
@@ -100,7 +100,6 @@ class Comparison(_Model):
     quantity: str
     unit: str
     tests: int
-    evaluations: tuple[int, ...]
     threshold: float | None
     verdict: Verdict
 
@@ -122,6 +121,7 @@ class Dossier(_Model):
         items: in the order of the chapters.
         flips: what depends on the time step.
         comparisons: with real tests.
+        validated: the region of each scenario that has evidence.
         gaps: everything that is missing.
         installed: installed distributions with their versions.
         evidence: the files that the numbers are of.
@@ -140,6 +140,7 @@ class Dossier(_Model):
     items: tuple[Item, ...]
     flips: tuple[Flip, ...]
     comparisons: tuple[Comparison, ...] = ()
+    validated: tuple[Region, ...] = ()
     gaps: tuple[Gap, ...]
     installed: dict[str, str]
     evidence: tuple[Evidence, ...]

@@ -1,4 +1,4 @@
-"""Part of recompute.py: figures of real tests (measured.csv), from that file and the runs' files.
+"""Part of recompute.py: figures of real tests (measured.csv), and the region that has evidence.
 
 Needs Python 3.11 alone.
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import mean, quantiles
 from typing import Any
 
-Groups = dict[str, list[tuple[float, float, float, float]]]
+Groups = dict[str, list[tuple[float, float, float, float, int]]]
 VERDICTS = {"accepted": "accepted", "refused": "not accepted", "undecided": "not decided"}
 VERDICTS |= {"without": "no threshold", "valueless": "no simulated value"}
 
@@ -49,7 +49,7 @@ def read(base: Path, runs: list[dict[str, Any]]) -> Groups:
         numbers = (float(cell[name] or "nan") for name in ("measured", "uncertainty", "threshold"))
         measured, off, most = numbers
         key = f"{run}|{cell['series'] or f'evaluation {number}'}|{cell['quantity']}"
-        groups[key].append((measured, value, 0.0 if math.isnan(off) else off, most))
+        groups[key].append((measured, value, 0.0 if math.isnan(off) else off, most, number - 1))
     return groups
 
 
@@ -76,6 +76,34 @@ def compared(some: list[Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def regions(base: Path, runs: list[dict[str, Any]], made: dict[Any, Any]) -> dict[Any, Any]:
+    """Return least and greatest value of parameters in rows with evidence, by scenario.
+
+    Args:
+        base: the dossier's folder.
+        runs: of the dossier.
+        made: verdicts by (run, row, …).
+    """
+    found: dict[Any, Any] = defaultdict(lambda: defaultdict(list))
+    for run in runs:
+        folder = base / run["folder"]
+        words = {word: {key[1] for key, one in made.items() if (key[0], one) == (run["id"], word)}
+                 for word in ("accepted", "not accepted")}  # fmt: skip
+        rows = words["accepted"] - words["not accepted"]
+        for path in folder.glob("confirmation-*.json"):
+            some = json.loads(path.read_text("utf-8"))["scenarios"]
+            rows |= {one["evaluation"] for one in some if one["there"] and one["there"]["critical"]}
+        sql = sqlite3.connect(f"{(folder / 'run.sqlite').absolute().as_uri()}?mode=ro", uri=True)
+        about = {key: json.loads(text) for key, text in sql.execute("SELECT * FROM run")}
+        settings = about["settings"]
+        key = run["scenario"], settings["fingerprint"], settings["vehicle"]
+        for row in rows:
+            values = sql.execute("SELECT * FROM evaluations WHERE id = ?", [row]).fetchone()[4:]
+            for name, value in zip(about["parameters"], values, strict=False):
+                found[key][name].append(value)
+    return found
+
+
 def check(
     base: Path, dossier: dict[str, Any], written: Callable[[Any, str], str]
 ) -> Iterator[tuple[str, Any, Any, bool]]:
@@ -85,13 +113,22 @@ def check(
     sizes, words = [len(some) for some in groups.values()], [m["verdict"] for m in made.values()]
     counts = {"tests": sum(sizes), "comparisons": len(sizes), "few": sum(n < 6 for n in sizes)}
     counts |= {name: words.count(word) for name, word in VERDICTS.items()}
+    tests = {(key.partition("|")[0], test[4], key): made[key]["verdict"]
+             for key, some in groups.items() for test in some}  # fmt: skip
+    spans = regions(base, dossier["runs"], tests)
+    counts["regions"] = len(spans)
     for item in dossier["numbers"]:
-        if item["source"] == "measured.csv":
+        if item["source"] in ("measured.csv", "validated.json"):
             name = item["id"].removeprefix("all.").partition(":")[0]
             found = made[item["of"]][name] if item["of"] else counts[name]
             same = math.isclose(found, item["value"], rel_tol=1e-9, abs_tol=1e-12)
             text = written(found, item["form"])
             yield item["id"], item["text"], text, same and item["text"] == text
+    for one in dossier["validated"]:
+        found = spans[one["scenario"], one["fingerprint"], one["vehicle"]]
+        for name, (low, high, _) in one["ranges"].items():
+            ends = [min(found[name]), max(found[name])]
+            yield f"region of {one['scenario']}: {name}", [low, high], ends, ends == [low, high]
     for one in dossier["comparisons"]:
         key = f"{one['run']}|{one['series']}|{one['quantity']}"
         found = made[key]["verdict"]
