@@ -81,6 +81,7 @@ def test_where_no_verdict_hangs_on_a_constant_nothing_is_said(tmp_path):
         "No verdict on 3 findings hangs on one constant alone."
         in (folder / SENSITIVITY).read_text()
     )
+    assert f'"beside":["{SENSITIVITY}"]' in (folder / "report.html").read_text("utf-8")
 
 
 def test_the_same_seed_gives_the_same_bytes(cut_out, tmp_path):
