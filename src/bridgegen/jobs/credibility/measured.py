@@ -17,7 +17,7 @@ from typing import NamedTuple
 from bridgegen.assess.metrics import METRICS
 from bridgegen.base.disk import read_inside
 from bridgegen.base.errors import FileFormatError
-from bridgegen.jobs.credibility.model import Comparison, Verdict
+from bridgegen.jobs.credibility.model import Comparison
 from bridgegen.jobs.safety_case.facts import Facts
 from bridgegen.jobs.safety_case.numbers import Numbers
 from bridgegen.jobs.search.exported import exported_scenarios
@@ -40,7 +40,7 @@ FEWEST = 6
 has 1 - 2 ** (1 - n), which is 95 % from 6 on."""
 RESAMPLES = 1000
 
-VERDICTS: Mapping[str, Verdict] = {
+VERDICTS: Mapping[str, str] = {
     "accepted": "accepted",
     "refused": "not accepted",
     "undecided": "not decided",
@@ -64,10 +64,6 @@ class RealTest(NamedTuple):
     threshold: float | None
 
 
-class _WrongError(Exception):
-    """A cell breaks a rule: column and rule."""
-
-
 def read_measured(folder: Path, runs: Mapping[str, Facts]) -> list[RealTest]:
     """Return the tests that people wrote into the folder of a dossier; none without the file.
 
@@ -76,7 +72,7 @@ def read_measured(folder: Path, runs: Mapping[str, Facts]) -> list[RealTest]:
         runs: that were read, by id.
 
     Raises:
-        FileFormatError: all that is wrong, with line and column.
+        FileFormatError: the first thing that is wrong, with line and column.
         StorageError: it cannot be read, or is a link to another folder.
     """
     place = folder / FILE
@@ -100,35 +96,36 @@ def read_measured(folder: Path, runs: Mapping[str, Facts]) -> list[RealTest]:
         raise FileFormatError(
             f"rows must be a line each, the first {','.join(COLUMNS)}, got {got!r} ({place})"
         )
-    tests, problems = list[RealTest](), list[str]()
     with ExitStack() as open_stores:
         stores = {
             name: Recorded(open_stores.enter_context(Store.open(facts.run.folder)))
             for name, facts in (runs if rows[1:] else {}).items()
         }
-        for (line, _), row in zip(lines[1:], rows[1:], strict=True):
-            cells = dict(zip(COLUMNS, [*row, *[""] * len(COLUMNS)], strict=False))
-            try:
-                tests.append(_test(cells, runs, stores))
-            except _WrongError as error:
-                column, rule = error.args
-                where = f"{place}, line {line}, column {column}"
-                problems.append(f"{column} must be {rule}, got {cells[column][:60]!r} ({where})")
-    problems += [
-        f"threshold must be the same in all tests of {group[0].series} and {group[0].quantity} "
-        f"({place}, column threshold)"
-        for group in _grouped(tests)
-        if len({test.threshold for test in group}) > 1
-    ]
-    if problems:
-        raise FileFormatError(*problems)
+        tests = [
+            _test(dict(zip(COLUMNS, [*row, *[""] * 8], strict=False)), runs, stores,
+                  f"{place}, line {line}")
+            for (line, _), row in zip(lines[1:], rows[1:], strict=True)
+        ]  # fmt: skip
+    for group in _grouped(tests):
+        if len({test.threshold for test in group}) > 1:
+            raise FileFormatError(
+                f"threshold must be the same in all tests of {group[0].series} and "
+                f"{group[0].quantity} ({place}, column threshold)"
+            )
     return tests
 
 
 def _test(
-    cells: Mapping[str, str], runs: Mapping[str, Facts], stores: Mapping[str, Recorded]
+    cells: Mapping[str, str],
+    runs: Mapping[str, Facts],
+    stores: Mapping[str, Recorded],
+    place: str,
 ) -> RealTest:
     """Return a row's test; raise the first rule that a cell breaks."""
+
+    def wrong(column: str, rule: str) -> FileFormatError:
+        got = cells[column][:60]
+        return FileFormatError(f"{column} must be {rule}, got {got!r} ({place}, column {column})")
 
     def number(column: str, least: float = 0.0, rule: str = "a number ≥ 0") -> float:
         try:
@@ -136,14 +133,14 @@ def _test(
         except ValueError:
             value = math.nan
         if not least <= value < math.inf:
-            raise _WrongError(column, rule)
+            raise wrong(column, rule)
         return value
 
     names = {name: facts.run.folder.resolve().name for name, facts in runs.items()}
     found = [name for name, folder in names.items() if cells["run"] in ("", folder)]
     if len(found) != 1:
         known = ", ".join(names.values())[:200] or "none"
-        raise _WrongError("run", f"the folder's name of one run that is read ({known})")
+        raise wrong("run", f"the folder's name of one run that is read ({known})")
     run, rows, quantity = runs[found[0]].run, stores[found[0]], cells["quantity"]
     digits = cells["scenario"].removeprefix("evaluation ")
     row = int(digits) - 1 if digits.isascii() and digits.isdecimal() and len(digits) < 10 else -1
@@ -151,13 +148,13 @@ def _test(
         exported = {item.name: item.evaluation for item in exported_scenarios(run.folder)}
         row = exported.get(digits.zfill(4), -1)
     if not 0 <= row < len(rows):
-        raise _WrongError("scenario", "an exported scenario's name, or 'evaluation N'")
+        raise wrong("scenario", "an exported scenario's name, or 'evaluation N'")
     if quantity not in run.metrics:
-        raise _WrongError("quantity", "a metric that the run records; search with --metric NAME")
+        raise wrong("quantity", "a metric that the run records; search with --metric NAME")
     own = {about["name"]: str(about["unit"]) for about in run.settings.own_metrics}
     unit = METRICS[quantity].unit if quantity in METRICS else own.get(quantity, "1")
     if cells["unit"] != unit:
-        raise _WrongError("unit", f"that of {quantity}, {unit!r}")
+        raise wrong("unit", f"that of {quantity}, {unit!r}")
     simulated = float(rows.metrics[row, run.metrics.index(quantity)])
     return RealTest(
         run=found[0],

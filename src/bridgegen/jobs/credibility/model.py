@@ -76,12 +76,6 @@ class Flip(_Model):
     text: str
 
 
-Verdict = Literal[
-    "accepted", "not accepted", "not decided", "no threshold", "no simulated value"
-]  # fmt: skip
-"""Verdict on a comparison: its interval is below the threshold, above it, or holds it."""
-
-
 class Comparison(_Model):
     """Real tests beside the simulation of the same scenarios; figures are numbers of the dossier.
 
@@ -92,7 +86,7 @@ class Comparison(_Model):
         unit: of it.
         tests: how many.
         threshold: greatest area that people accept; None if they state none.
-        verdict: on the area.
+        verdict: on the area: its interval is below the threshold, above it, or holds it.
     """
 
     run: str
@@ -101,7 +95,7 @@ class Comparison(_Model):
     unit: str
     tests: int
     threshold: float | None
-    verdict: Verdict
+    verdict: str
 
 
 class Dossier(_Model):
