@@ -44,6 +44,11 @@ def test_without_any_region_nothing_is_said_and_of_another_vehicle_none_holds(ve
     assert extrapolated(regions, "f", vehicle, ["speed", "gap"], X[:0])[1] == ""
 
 
+def test_a_warning_is_no_longer_than_its_record_takes():
+    hostile = REGION.model_copy(update={"evidence": "x" * 2000})
+    assert len(extrapolated([hostile], "f", "kinematic", ["speed"], np.array([[99.0]]))[1]) == 2000
+
+
 def value(run, row: int, name: str) -> float:
     with sqlite3.connect(run / "run.sqlite") as connection:
         (found,) = connection.execute(f"SELECT {name} FROM evaluations WHERE id = ?", [row])

@@ -1,6 +1,6 @@
 """``validated.json`` of a dossier: the ranges in which there is evidence for a scenario."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,9 +11,9 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import FileFormatError
 from bridgegen.base.records import read_model
 
-FILE, MOST_NAMED = "validated.json", 3
+FILE, MOST_NAMED, MOST_LETTERS = "validated.json", 3, 2000
 
-_Text = Annotated[str, Field(max_length=2000)]
+_Text = Annotated[str, Field(max_length=MOST_LETTERS)]
 
 
 class Region(BaseModel):
@@ -65,7 +65,7 @@ def _not_ours(path: Path, why: str) -> FileFormatError:
 
 
 def extrapolated(
-    regions: Iterable[Region], fingerprint: str, vehicle: str, names: Sequence[str], X: Float
+    regions: Sequence[Region], fingerprint: str, vehicle: str, names: Sequence[str], X: Float
 ) -> tuple[Int, str]:
     """Return which findings lie outside the region of their scenario, and a warning.
 
@@ -75,13 +75,12 @@ def extrapolated(
         regions: the first one of the scenario counts.
         fingerprint: of the scenario.
         vehicle: of the ego.
-        names: of the columns.
+        names: of the columns; those without a range are not compared.
         X: ``(N, len(names))``, the findings.
     """
-    known = [*regions]
-    own = [one for one in known if (one.fingerprint, one.vehicle) == (fingerprint, vehicle)]
+    own = [one for one in regions if (one.fingerprint, one.vehicle) == (fingerprint, vehicle)]
     if not own or not len(X):
-        rows = np.arange(len(X) if known else 0)
+        rows = np.arange(len(X) if regions else 0)
         return rows, "this scenario is outside all regions that are validated" * bool(len(rows))
     over = np.zeros_like(X)
     for k, name in enumerate(names):
@@ -91,7 +90,8 @@ def extrapolated(
     worst = [k for k in np.argsort(-count, kind="stable").tolist() if count[k]]
     said = [f"{own[0].side(names[k])}, finding {X[over[:, k].argmax(), k]:.4g}" for k in worst]
     more = [f"and {len(said) - MOST_NAMED} more parameters"] if said[MOST_NAMED:] else []
-    return rows, (
+    text = (
         f"{len(rows)} of {len(X)} findings lie outside the region for which the models were "
         f"validated: {'; '.join(said[:MOST_NAMED] + more)}. It is that of {own[0].evidence}"
-    ) * bool(worst)
+    )
+    return rows, text[:MOST_LETTERS] * bool(worst)

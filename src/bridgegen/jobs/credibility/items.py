@@ -136,15 +136,15 @@ def _steps(number: str, kind: str, title: str, noun: str, how: str) -> Asked:
 
 
 ORACLES = (
-    ("UN R157's models: the code of the Commission's Joint Research Centre (JRC-FSM)",
+    ("UN R157's models: the Commission's code (JRC-FSM), cut-ins with the ego at 20 to 130 km/h",
      "tests/ego/test_preventable.py::test_it_counts_the_crashes_that_the_commissions_code_counts"),
-    ("driver un-r157: the same code",
+    ("driver un-r157: the same code, cut-ins with the ego at 50 to 130 km/h",
      "tests/ego/test_un_r157_kernels.py"
      "::test_it_crashes_in_the_cut_ins_in_which_the_commissions_code_does"),
-    ("single-track vehicle: CommonRoad's vehicle models",
+    ("single-track vehicle: CommonRoad's vehicle models, at 15 to 22 m/s and up to 8.3 m/s² across",
      "tests/simulation/embedded/chassis/test_single_track.py"
      "::test_standard_manoeuvres_are_as_commonroad_s_model_has_them_to_a_hundredth"),
-    ("multi-body vehicle: CommonRoad's vehicle models",
+    ("multi-body vehicle: CommonRoad's vehicle models, at 15 to 22 m/s and up to 8.6 m/s² across",
      "tests/simulation/embedded/chassis/test_multi_body.py"
      "::test_standard_manoeuvres_are_as_commonroad_s_model_has_them"),
     ("motion of storyboards: esmini",

@@ -46,38 +46,31 @@ def regions(
     made = []
     for (scenario, fingerprint, vehicle), some_runs in found.items():
         space = some_runs[0][0].space
-        units = dict(zip(space.names, space.units, strict=True))
-        X = np.concatenate([_numbers(one, set().union(*of.values())) for one, of in some_runs])
-        words = [
-            f"{len(rows)} rows {how}" for _, of in some_runs for how, rows in of.items() if rows
-        ]
+        X = np.concatenate([_rows(one, set().union(*of.values())) for one, of in some_runs])
+        pairs = [pair for _, of in some_runs for pair in of.items()]
         ranges = {
-            name: (float(x.min()), float(x.max()), units[name])
-            for name, x in zip(numeric(some_runs[0][0]), X.T, strict=True)
+            name: (float(x.min()), float(x.max()), unit)
+            for name, unit, x in zip(space.names, space.units, X.T, strict=True)
+            if name in space.parameters and name not in space.labels
         }
         made.append(
             Region(
-                scenario=scenario, fingerprint=fingerprint, vehicle=vehicle,
-                evidence=", ".join(words), ranges=ranges,
+                scenario=scenario, fingerprint=fingerprint, vehicle=vehicle, ranges=ranges,
+                evidence=", ".join(f"{len(rows)} rows {how}" for how, rows in pairs if rows)[:1000],
             )
         )  # fmt: skip
     return made
 
 
-def numeric(facts: Facts) -> list[str]:
-    """Return the parameters whose values are numbers."""
-    return [name for name in facts.space.parameters if name not in facts.space.labels]
-
-
-def _numbers(facts: Facts, rows: Iterable[int]) -> Float:
+def _rows(facts: Facts, rows: Iterable[int]) -> Float:
     with Store.open(facts.run.folder) as store:
         X: Float = Recorded(store).X[np.array(sorted(rows), dtype=np.int64)]
-    return np.stack([X[:, facts.space.names.index(name)] for name in numeric(facts)], axis=1)
+    return X
 
 
 def warning(facts: Facts, found: Sequence[Region]) -> str:
     """Return whether the exported findings of a run lie outside its region; "" if none does."""
     rows = [item.evaluation for item in exported_scenarios(facts.run.folder)]
-    X = _numbers(facts, [row for row in rows if facts.harm[row] >= NEAR_MISS])
-    settings = facts.run.settings
-    return extrapolated(found, settings.fingerprint, str(settings.vehicle), numeric(facts), X)[1]
+    X = _rows(facts, [row for row in rows if facts.harm[row] >= NEAR_MISS])
+    settings, names = facts.run.settings, facts.space.names
+    return extrapolated(found, settings.fingerprint, str(settings.vehicle), names, X)[1]

@@ -414,15 +414,13 @@ def _extrapolated(
 
     A dossier that is damaged is a warning: what was searched does not depend on it.
     """
-    space = pipeline.space
-    names = [name for name in space.parameters if name not in space.labels]
     try:
         regions = regions_beside(folder)
     except BridgeGenError as error:
         callbacks.warning("; ".join(error.problems))
         regions = []
-    X = X[:, [space.names.index(name) for name in names]]
-    return extrapolated(regions, settings.fingerprint, str(settings.vehicle), names, X)
+    of = settings.fingerprint, str(settings.vehicle), pipeline.space.names
+    return extrapolated(regions, *of, X)
 
 
 def _critical_by_objective(rows: Recorded, keep: int) -> Int:
