@@ -137,11 +137,16 @@ def test_a_run_beside_a_dossier_warns_in_terminal_report_and_suite(tmp_path):
     assert any("validated.json: must be what 'bridgegen credibility' writes" in w for w in warned)
 
 
-def test_a_verdict_that_hangs_on_the_time_step_is_kept_with_that_note(made, tmp_path):
-    run = bg.Run(made["hangs"])
-    hang = {check.evaluation for check in run.triage.step_checks if not check.stable}
-    exported = {one.name: one.evaluation for one in exported_scenarios(run.folder)}
-    name = next(name for name, evaluation in exported.items() if evaluation in hang)
-    add_failures([run.folder / "critical" / f"{name}.xosc"], tmp_path / "suite")
+def test_a_verdict_that_hangs_on_the_time_step_is_kept_with_that_note(project, tmp_path):
+    """A check of an exported finding is changed: no failure at half of the step."""
+    path = project / "hangs" / "triage.json"
+    data = json.loads(path.read_text("utf-8"))
+    exported = {one.evaluation: one.name for one in exported_scenarios(path.parent)}
+    check = next(one for one in data["step_checks"] if one["evaluation"] in exported)
+    check["at"][1]["harmful"] = False
+    path.write_text(json.dumps(data), "utf-8")
+    name = exported[check["evaluation"]]
+    (made,) = add_failures([path.parent / "critical" / f"{name}.xosc"], tmp_path / "suite")
+    assert made.reason == "depends on the time step"
     (failure,) = read_failures(tmp_path / "suite").failures.values()
     assert failure.note == "depends on the time step"
