@@ -62,6 +62,7 @@ def json_of_suite(suite: SuiteRun) -> dict[str, Any]:
             }
             for map_ in suite.maps
         ],
+        **({"sealed": suite.sealed.model_dump(exclude={"results"})} if suite.sealed else {}),
     }
 
 
@@ -95,6 +96,13 @@ def suite_shown(suite: SuiteRun) -> list[str | Table]:
     if gone := suite.known_failures.gone(suite.results):
         found.append(f"no longer fail, set their status to fixed: {', '.join(gone)}")
     found += [f"map         {map_.page}" for map_ in suite.maps]
+    if suite.sealed is not None:
+        from bridgegen.jobs.suite.sealed import FILE, sealed_lines
+
+        for ego, label in zip(suite.egos, suite.labels, strict=True):
+            found += ["", f"{label}, drawn by an assessor (95 % intervals):"]
+            found += [f"  {line}" for line in sealed_lines(suite.sealed, ego)]
+        found += ["", f"sealed      {suite.folder / FILE}", f"seal        {suite.sealed.seal}"]
     return [*found, f"page        {suite.page}"]
 
 
