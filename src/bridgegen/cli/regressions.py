@@ -147,18 +147,19 @@ def verify(
     sealed: Annotated[Path, typer.Argument(help="The sealed result, sealed.json.")],
     files: Files,
     published: Annotated[
-        list[str], typer.Option(help="Published hash of the key, or seal.", rich_help_panel=WHAT)
-    ] = [],  # noqa: B006
+        list[str] | None,
+        typer.Option(help="Published hash of the key, or seal.", rich_help_panel=WHAT),
+    ] = None,
     ego: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
             help="Run it again with this driver; with a mended one, a re-test.",
             rich_help_panel=DRIVER,
             autocompletion=completing("driver"),
         ),
-    ] = [],  # noqa: B006
+    ] = None,
 ) -> None:
     """Verify a sealed result: its seal, its hash, its variations; with --ego, its verdicts."""
     from bridgegen.jobs.suite.sealed import verify as lines_of
 
-    print("\n".join(lines_of(sealed, files, published, ego)))
+    print("\n".join(lines_of(sealed, files, published or (), ego or ())))

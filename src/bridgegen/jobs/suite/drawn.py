@@ -152,10 +152,9 @@ def _moved(
 
 def _spanned(parameter: Parameter) -> Parameter:
     """Return a parameter whose set of numbers is the range that it spans."""
-    is_set = isinstance(parameter, FileParameter) and isinstance(parameter.distribution, Discrete)
-    return (
-        replace(parameter, distribution=None) if is_set and parameter.kind == FLOAT else parameter
-    )
+    if isinstance(parameter, FileParameter) and isinstance(parameter.distribution, Discrete):
+        return replace(parameter, distribution=None) if parameter.kind == FLOAT else parameter
+    return parameter
 
 
 def _widened(parameter: Parameter) -> Parameter:

@@ -105,16 +105,25 @@ def evaluate(job: Job) -> EntryResult:
         return found.model_copy(update={"problem": str(error)})
 
 
+def scenario_of(job: Job) -> SearchedScenario:
+    """Return the scenario of an entry.
+
+    Raises:
+        InputError: the files cannot be read.
+    """
+    entry = job.entry
+    is_file = entry.scenario.lower().endswith(".xosc")
+    trigger = job.options.empty_trigger if is_file else None
+    return driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
+
+
 def pipeline_of(job: Job) -> Pipeline:
     """Return the pipeline of an entry, ready to evaluate.
 
     Raises:
         InputError: the files cannot be read or run.
     """
-    entry = job.entry
-    is_file = entry.scenario.lower().endswith(".xosc")
-    trigger = job.options.empty_trigger if is_file else None
-    scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
+    entry, scenario = job.entry, scenario_of(job)
     options = replace(
         job.options,
         ego=job.ego,

@@ -19,11 +19,17 @@ from bridgegen.base.records import read_bytes, read_model
 from bridgegen.base.statistics import clopper_pearson
 from bridgegen.base.units import percent
 from bridgegen.drivers.identity import digest_of, identity_of, labels_of
-from bridgegen.jobs.search.scenarios import load
 from bridgegen.jobs.suite.difference import difference
 from bridgegen.jobs.suite.drawn import BESIDE, BOUND, INSIDE, OUTSIDE, Draw, drawn, numbers
 from bridgegen.jobs.suite.entries import Entry, find_entries
-from bridgegen.jobs.suite.evaluate import Job, evaluate, pipeline_of, rows_of_job, written
+from bridgegen.jobs.suite.evaluate import (
+    Job,
+    evaluate,
+    pipeline_of,
+    rows_of_job,
+    scenario_of,
+    written,
+)
 from bridgegen.jobs.suite.failing import seeking_causes, ways
 from bridgegen.jobs.suite.options import SAMPLES, SUITE, SuiteOptions
 from bridgegen.jobs.suite.replay import job_of
@@ -186,17 +192,15 @@ def verify(
         InputError: it was altered, is not what was published, or its scenarios have changed.
         StorageError: it cannot be read.
     """
-    sealed, entries = _read(path, Sealed), {entry.digest: entry for entry in find_entries(files)}
+    sealed, entries = _read(path, Sealed), find_entries(files)
     known = {sealed.key.commitment: "the key's hash", sealed.seal: "the seal"}
-    sealed.key.require([*entries.values()], path)
+    sealed.key.require(entries, path)
     if sealed.seal != hash_of(sealed, "seal"):
         raise InputError(f"{path}: was altered: its content does not have the seal {sealed.seal}")
     if odd := [text for text in published if text not in known]:
         kept = " and ".join(f"{name} is {text}" for text, name in known.items())
         raise InputError(f"{path}: is not what was published as {odd[0][:80]}: {kept}")
     jobs = list(_jobs(path, sealed, entries))
-    for job, result in jobs:
-        _verify_rows(path, job, result)
     texts = ", ".join(known[text] for text in published) or "nothing compared (--published HASH)"
     unrun = sum(bool(result.problem) for _, result in jobs)
     return [
@@ -210,69 +214,59 @@ def verify(
 
 
 def _jobs(
-    path: Path, sealed: Sealed, entries: dict[str, Entry]
+    path: Path, sealed: Sealed, entries: Sequence[Entry]
 ) -> Iterator[tuple[Job, EntryResult]]:
-    """Yield what was run, of the scenarios that the user names, with its results."""
+    """Yield what was run, of the scenarios that the user names, with its verified results."""
+    of = {entry.digest: entry for entry in entries}
+    suite = SuiteRun(path.parent, (), (), sealed.settings)
     for outside, results in ((False, sealed.results), (True, sealed.outside)):
-        for ego in {result.ego for result in (*sealed.results, *sealed.outside)}:
+        draw = Draw(sealed.key.secret, sealed.key.number, outside)
+        for ego in {result.ego for result in (*sealed.results, *sealed.outside)} or {""}:
             digests = [result.digest for result in results if result.ego == ego]
-            if sorted(digests) != sorted(entries):
+            if sorted(digests) != sorted(entry.digest for entry in entries):
                 raise InputError(f"{path}: was altered: results of '{ego[:80]}' are missing")
         for result in results:
-            entry = entries[result.digest]
-            of = {"scenario": entry.scenario, "distribution": entry.distribution or ""}
-            suite = SuiteRun(path.parent, (), (), sealed.settings)
-            job = job_of(suite, result.model_copy(update=of))
-            draw = Draw(sealed.key.secret, sealed.key.number, outside)
-            yield replace(job, entry=replace(entry, name=result.entry), draw=draw), result
-
-
-def _verify_rows(path: Path, job: Job, result: EntryResult) -> None:
-    entry, draw = job.entry, job.draw
-    scenario = load(entry.scenario, entry.distribution, job.options.empty_trigger)
-    space = scenario.space()
-    assert draw is not None
-    found = drawn(scenario, space, draw, entry.digest)
-    values = written(scenario, space, found.X, found.names)
-    expected = [[name, *x] for name, x in zip(found.strata, values, strict=True)]
-    if not result.problem and [row.x for row in result.rows] != expected:
-        raise InputError(f"{path}: was altered: the key draws others of {entry.name}")
+            entry = replace(of[result.digest], name=result.entry)
+            named = {"scenario": entry.scenario, "distribution": entry.distribution or ""}
+            job = replace(job_of(suite, result.model_copy(update=named)), entry=entry, draw=draw)
+            scenario = scenario_of(job)
+            space = scenario.space()
+            found = drawn(scenario, space, draw, entry.digest)
+            values = written(scenario, space, found.X, found.names)
+            expected = [[name, *x] for name, x in zip(found.strata, values, strict=True)]
+            if not (result.problem and not result.rows) and [r.x for r in result.rows] != expected:
+                raise InputError(f"{path}: was altered: the key draws others of {entry.name}")
+            yield job, result
 
 
 def _again(
     path: Path, sealed: Sealed, jobs: Sequence[tuple[Job, EntryResult]], ego: str
 ) -> Iterator[str]:
     """Yield what a driver makes of the sealed variations: the same again, or a re-test."""
-    olds = [old for old in dict.fromkeys(job.ego or "" for job, _ in jobs)]
-    before = [(job, result) for job, result in jobs if job.ego == (ego if ego in olds else olds[0])]
-    again = [replace(job, ego=ego) for job, _ in before]
-    results = [
-        evaluate(job).model_copy(
-            update={"scenario": old.scenario, "distribution": old.distribution}
-        )
-        for job, (_, old) in zip(again, before, strict=True)
-    ]
-    inside = [i for i, job in enumerate(again) if job.draw and not job.draw.outside]
-    old, new = before[0][1], results[0]
-    if (old.ego, old.driver_digest) == (new.ego, new.driver_digest):
-        failures = _failures([again[i] for i in inside], [results[i] for i in inside])
-        same = [failure for failure in sealed.failures if failure.ego == ego]
-        if failures != same or results != [result for _, result in before]:
+    own = identity_of(ego, digest_of(ego))
+    who = [identity_of(old.ego or old.driver, old.driver_digest) for _, old in jobs]
+    same = [pair for pair, driver in zip(jobs, who, strict=True) if driver.content == own.content]
+    before = same or [pair for pair in jobs if pair[1].ego == jobs[0][1].ego]
+    again, results = [replace(job, ego=ego) for job, _ in before], list[EntryResult]()
+    for job, (_, old) in zip(again, before, strict=True):
+        named = {"ego": old.ego, "scenario": old.scenario, "distribution": old.distribution}
+        results.append(evaluate(job).model_copy(update=named))
+    n = sum(job.draw is not None and not job.draw.outside for job in again)  # which come first
+    if same:
+        failures = [one for one in sealed.failures if one.ego == before[0][1].ego]
+        if [old for _, old in same] != results or _failures(again[:n], results[:n]) != failures:
             raise InputError(f"{path}: was altered, or {ego} has chance in it: results differ")
         yield f"run again       {ego}: the same results and root causes, to the bit"
         return
-    labels = labels_of(
-        [identity_of(one.ego or one.driver, one.driver_digest) for one in (old, new)]
-    )
-    found = difference(
-        [before[i][1] for i in inside], [results[i] for i in inside], (labels[0], labels[1])
-    )
+    first, second = labels_of([who[0], own])
+    found = difference([old for _, old in before[:n]], results[:n], (first, second))
     changes = {(row.entry, row.row + 1): row.change for row in found.rows}
     yield f"re-test         {found.headline}"
     for one in sealed.failures:
-        if one.ego == old.ego:
+        if one.ego == before[0][1].ego:
             change = changes.get((one.entry, one.number), "not comparable")
-            yield f"  {one.entry} {one.number}: {one.title} · {one.cause or 'cause not found'}: {change}"
+            cause = one.cause or "no cause found"
+            yield f"  {one.entry} {one.number}, {change}: {one.title} · {cause}"
 
 
 def _failures(jobs: Iterable[Job], results: Iterable[EntryResult]) -> list[Failure]:
