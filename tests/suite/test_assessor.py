@@ -23,9 +23,9 @@ from bridgegen.jobs.suite.entries import find_entries
 from bridgegen.jobs.suite.evaluate import Job, pipeline_of, rows_of_job
 from bridgegen.jobs.suite.replay import replay
 from bridgegen.jobs.suite.rows import rows_of
-from bridgegen.jobs.suite.sealed import FILE, Sealed, commit, hash_of, verify
+from bridgegen.jobs.suite.sealed import Sealed, commit, hash_of, verify
 from bridgegen.jobs.suite.suite import FILE as RESULTS
-from bridgegen.jobs.suite.suite import evaluate_suite
+from bridgegen.jobs.suite.suite import SEALED, evaluate_suite
 from bridgegen.scenario.language.kinds import FLOAT
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.choice import EMBEDDED
@@ -150,8 +150,8 @@ def call(monkeypatch, text):
     return end.value.code or 0
 
 
-def assess(key="a.key", **options):
-    return evaluate_suite("cut-in", egos=["route-follower"], assessor=Path(key), **options)
+def assess(key="a.key", out="out", **options):
+    return evaluate_suite("cut-in", egos=["route-follower"], assessor=Path(key), out=out, **options)
 
 
 def resealed(path, change):
@@ -174,10 +174,10 @@ def test_the_whole_way_on_the_command_line(home, monkeypatch, capsys):
     words = "suite cut-in --ego route-follower --assessor b.key --out suites/one --workers 1"
     assert call(monkeypatch, words) == 3
     text = capsys.readouterr().out
-    approve(text, "inside:", "at a bound:", "beside published:", "outside, not counted:", "worst:")
+    approve(text, "Drawn by", "Not counted", "Worst")
     page = Path("suites/one/suite.html").read_text()
-    assert "beside published: " in page
-    sealed = json.loads(Path("suites/one", FILE).read_text())
+    assert "beside published " in page
+    sealed = json.loads(Path("suites/one", SEALED).read_text())
     assert sealed["key"]["secret"] == key["secret"]  # revealed
     (result,), (outside,) = sealed["results"], sealed["outside"]
     assert [len(result["rows"]), len(outside["rows"])] == [16, 4]
@@ -201,7 +201,7 @@ def test_a_suite_without_a_key_records_what_it_did_before(home):
 
 def test_a_key_serves_once(home):
     assess()
-    for out in (None, "elsewhere/other"):
+    for out in ("out", "elsewhere/other", None):
         with refuses(InputError, "used before"):
             assess(out=out)
     Path("copy.key").write_bytes(Path("a.key").read_bytes())
@@ -254,7 +254,7 @@ def test_what_is_wrong_with_a_key_is_one_error(home):
 
 def test_a_sealed_file_that_was_altered_is_refused(home):
     suite = assess()
-    path, none = suite.folder / FILE, ()
+    path, none = suite.folder / SEALED, ()
     text = path.read_text()
     altered = path.with_name("altered.json")
     altered.write_text(text.replace('"critical": true', '"critical": false', 1))
@@ -300,7 +300,7 @@ def test_a_mended_driver_is_tested_again(home):
     )
     failures = suite.sealed.failures
     assert failures
-    lines = verify(suite.folder / FILE, ["cut-in"], (), [f"{PLANTED}:careful"])
+    lines = verify(suite.folder / SEALED, ["cut-in"], (), [f"{PLANTED}:careful"])
     (head,) = [line for line in lines if line.startswith("re-test")]
     approve(head, "fixes")
     assert sum(", fixed: " in line and failures[0].title in line for line in lines)

@@ -148,11 +148,6 @@ def _banner(suite: SuiteRun, page: Mapping[str, Any], commands: Mapping[Key, str
     said = "; ".join(page["headlines"])
     if page["changed"]:  # the heading says who against whom
         said = page["changed"]["headline"].rpartition(": ")[2].capitalize()
-    if suite.sealed is not None:
-        from bridgegen.jobs.suite.sealed import sealed_lines
-
-        said += ". Drawn by an assessor: "
-        said += "; ".join(line for ego in egos for line in sealed_lines(suite.sealed, ego))
     worst = [key_of(result) for result in _failed(suite) if result.ego in (*egos, "", None)]
     return Banner(f"{said}.", kind, word, next((commands[k] for k in worst if k in commands), ""))
 

@@ -34,10 +34,10 @@ from bridgegen.jobs.suite.failing import seeking_causes, ways
 from bridgegen.jobs.suite.options import SAMPLES, SUITE, SuiteOptions
 from bridgegen.jobs.suite.replay import job_of
 from bridgegen.jobs.suite.results import EntryResult, Strict, rank
-from bridgegen.jobs.suite.suite import SuiteRun, check, default_folder, run_entries
+from bridgegen.jobs.suite.suite import SEALED, SuiteRun, check, default_folder, run_entries
 
-FILE, BEYOND = "sealed.json", "outside.jsonl"
-"""Files in the folder of the results: the sealed one, and of what lies outside the ranges."""
+BEYOND = "outside.jsonl"
+"""File in the folder of the results, of what lies outside the ranges."""
 
 REGISTER = "assessor-keys.jsonl"
 """File beside a key, and beside the folders of results, of the keys that were used."""
@@ -169,7 +169,7 @@ def assess(given: SuiteOptions, key_file: Path) -> SuiteRun:
         failures=_failures(suite.jobs, suite.results),
     )
     made = made.model_copy(update={"seal": hash_of(made, "seal")})
-    write_whole(folder / FILE, [made.model_dump_json(indent=1).encode()])
+    write_whole(folder / SEALED, [made.model_dump_json(indent=1).encode()])
     return replace(suite, sealed=made)
 
 
@@ -286,7 +286,8 @@ def _failures(jobs: Iterable[Job], results: Iterable[EntryResult]) -> list[Failu
                 title="violates a clause" if way.problem else way.title,
                 cause=way.key.cause,
             )
-            made.append((rank(result.rows[i]), failure))
+            row = result.rows[i]
+            made.append(((-row.severity, *rank(row)), failure))
     return [failure for _, failure in sorted(made, key=lambda one: one[0])]
 
 
@@ -312,7 +313,7 @@ def _spend(key: Key, path: Path, folder: Path, drivers: Sequence[str]) -> None:
             register.parent.mkdir(parents=True, exist_ok=True)
             lines = read_bytes(register).decode().splitlines() if register.exists() else []
             before = [line for line in lines if key.commitment in line]
-            if before and (before != [use] or (folder / FILE).exists()):
+            if before and (before != [use] or (folder / SEALED).exists()):
                 raise InputError(
                     f"{path}: this key was used before ({register.name}); make another"
                 )
@@ -331,14 +332,20 @@ def sealed_lines(sealed: Sealed, ego: str) -> list[str]:
         if result.ego == ego
         for row, verdict in zip(result.rows, result.verdicts, strict=True)
     )
-    made = []
+    texts = []
     for name in (INSIDE, BOUND, BESIDE, OUTSIDE):
         failed, n = counted[name, "failed"], counted[name, "failed"] + counted[name, "passed"]
         low, high = clopper_pearson(failed, n)
-        text = f"{failed} of {n} fail ({percent(low)} to {percent(high)})"
+        share = f" ({percent(low)} to {percent(high)})" if n else ""
         lost = counted[name, "not judged"] + counted[name, "not run"]
-        text += f", {lost} not judged" if lost else ""
-        made.append(f"{name}{', not counted' if name == OUTSIDE else ''}: {text}")
+        more = f", {lost} not judged" if lost else ""
+        texts.append(f"{name} {failed} of {n} fail{share}{more}")
+    *within, outside = texts
+    made = [
+        f"Drawn by an assessor (95 % intervals): {'; '.join(within)}",
+        f"Not counted: {outside}",
+    ]
     if worst := next((failure for failure in sealed.failures if failure.ego == ego), None):
-        made.append(f"worst: {worst.title}; root cause: {worst.cause or 'not found'}")
+        cause = worst.cause or "not found"
+        made.append(f"Worst: {worst.entry} {worst.number} {worst.title}; root cause: {cause}")
     return made

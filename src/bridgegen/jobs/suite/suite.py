@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from bridgegen.jobs.preventability.result import PreventabilityMap
     from bridgegen.jobs.suite.sealed import Sealed
 
-LOCK = "suite.lock"
+LOCK, SEALED = "suite.lock", "sealed.json"
 MOST_BYTES = 2**30
 """Largest size of a file of results [bytes]."""
 
@@ -96,6 +96,12 @@ class SuiteRun:
     def work(self) -> str:
         """How many variations have a result."""
         return f"{sum(len(result.rows) for result in self.results):,} variations"
+
+    def drawn_lines(self, ego: str) -> list[str]:
+        """Return what an ego makes of what an assessor's key drew; nothing without one."""
+        from bridgegen.jobs.suite.sealed import sealed_lines
+
+        return sealed_lines(self.sealed, ego) if self.sealed else []
 
     def of_ego(self, ego: str) -> tuple[EntryResult, ...]:
         """Return the results with one ego."""
