@@ -132,9 +132,10 @@ def commit(
         int, typer.Option(help="Variations of each scenario.", rich_help_panel=SEARCH)
     ] = 200,
 ) -> None:
-    """Make an assessor's key, and print the hash to publish before the driver is handed in.
+    """Make an assessor's key, and print the hash to publish.
 
-    'suite ... --assessor KEY' draws the variations of that key, once, and seals the result.
+    Publish it before the driver is handed in. 'suite ... --assessor KEY' draws the variations of
+    that key, once, and seals the result.
     """
     from bridgegen.jobs.suite.sealed import commit as lines_of
 
@@ -159,7 +160,7 @@ def verify(
         ),
     ] = None,
 ) -> None:
-    """Verify a sealed result: its seal, its hash, its variations; with --ego, its verdicts."""
+    """Verify a sealed result; with --ego, run it again."""
     from bridgegen.jobs.suite.sealed import verify as lines_of
 
     print("\n".join(lines_of(sealed, files, published or (), ego or ())))

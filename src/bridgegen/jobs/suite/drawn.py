@@ -78,17 +78,16 @@ def drawn(scenario: SearchedScenario, space: SearchSpace, draw: Draw, digest: st
     rules = replace(space.constraints, parameters=parameters)
     space = SearchSpace(rules, space.axes, space.fixed, name=space.name, decisions=space.decisions)
     rules = replace(rules, parameters=wide)
+    open_ended = [name for name in moved if wide[name] != parameters[name]]
     parts, excluded = dict[str, Float](), 0
     for name, number in numbers(draw.number).items():
-        if (name == OUTSIDE) != draw.outside or not (space.n_var if name in _OF_CUBE else moved):
+        changed = {BESIDE: moved, OUTSIDE: open_ended}.get(name, list(space.variables))
+        if (name == OUTSIDE) != draw.outside or not changed:
             continue
         # A stream for each kind, so that none depends on how many another one has.
         seed = hmac.digest(draw.secret.encode(), f"{digest} {name}".encode(), "sha256")
         rng = np.random.Generator(np.random.PCG64(int.from_bytes(seed, "big")))
-        if name in _OF_CUBE:
-            X = _of_cube(name, space, number * _TRIES, rng)
-        else:
-            X = _moved(name, scenario, space, wide, moved, number * _TRIES, rng)
+        X = _candidates(name, scenario, space, wide, changed, number * _TRIES, rng)
         table = {column: X[:, i] for i, column in enumerate(space.names)}
         broken = np.zeros(len(X), np.bool_)
         broken[[violation.row for violation in violations(rules, table)]] = True
@@ -108,34 +107,28 @@ def drawn(scenario: SearchedScenario, space: SearchSpace, draw: Draw, digest: st
     return Rows(X, names, excluded, strata=tuple(n for n, part in parts.items() for _ in part))
 
 
-_OF_CUBE = (INSIDE, BOUND)
-
-
-def _of_cube(name: str, space: SearchSpace, n: int, rng: np.random.Generator) -> Float:
-    U = rng.random((n, space.n_var))
-    if name == BOUND:
-        one = np.arange(n)[:, np.newaxis] % space.n_var == np.arange(space.n_var)
-        U = np.where(one | (rng.random((n, 1)) < 0.5), rng.integers(0, 2, U.shape), U)
-    return space.decode(U)
-
-
-def _moved(
+def _candidates(
     name: str,
     scenario: SearchedScenario,
     space: SearchSpace,
     wide: dict[str, Parameter],
-    moved: list[str],
+    changed: list[str],
     n: int,
     rng: np.random.Generator,
 ) -> Float:
-    """Return rows beside published ones, or outside; some may break a constraint."""
+    """Return rows of one kind; those beside published ones, or outside, may break a constraint."""
+    U = rng.random((n, space.n_var))
+    if name == BOUND:
+        one = np.arange(n)[:, np.newaxis] % space.n_var == np.arange(space.n_var)
+        U = np.where(one | (rng.random((n, 1)) < 0.5), rng.integers(0, 2, U.shape), U)
+    X = space.decode(U)
+    if name in (INSIDE, BOUND):
+        return X
     if name == BESIDE:
         X = rows_of(scenario, scenario.space(), SAMPLES, 0).X
         X = X[rng.permutation(len(X))[np.arange(n) % len(X)]]
-    else:
-        X = _of_cube(INSIDE, space, n, rng)
     columns = {item: X[:, space.index(item)].copy() for item in wide}
-    for k, item in enumerate(moved):
+    for k, item in enumerate(changed):
         low, high, x = space.parameters[item].low, space.parameters[item].high, columns[item]
         sign, share = rng.choice([-1.0, 1.0], n), 1.0 - rng.random(n)  # never 0: no end itself
         if name == BESIDE:
@@ -146,7 +139,7 @@ def _moved(
             # An end that is the world's, and not the file's, has nothing beyond it.
             sign = np.where(wide[item].low == low, 1.0, np.where(wide[item].high == high, -1, sign))
             beyond = np.where(sign < 0, low, high) + sign * share * MARGIN * (high - low)
-            columns[item] = np.where(np.arange(n) % len(moved) == k, beyond, x)
+            columns[item] = np.where(np.arange(n) % len(changed) == k, beyond, x)
     return space.rows(columns, n)
 
 

@@ -42,8 +42,9 @@ BEYOND = "outside.jsonl"
 REGISTER = "assessor-keys.jsonl"
 """File beside a key, and beside the folders of results, of the keys that were used."""
 
-LEAST, MOST = 10, 10_000
-"""Number of variations that a key draws of each scenario, at least and at most."""
+LEAST, MOST = 10, 100_000
+"""Number of variations that a key draws of a scenario at least, and of all with all drivers at
+most: a sealed file of more could not be read."""
 
 
 class Key(Strict):
@@ -116,17 +117,12 @@ def commit(path: Path, files: Sequence[str], number: int) -> list[str]:
         StorageError: the file exists, or cannot be written.
     """
     entries = find_entries(files)
-    if not LEAST <= number <= MOST:
-        raise InputError(f"--number must be {LEAST} to {MOST:,}, got {number}")
+    if not LEAST <= number <= (most := MOST // len(entries)):
+        raise InputError(f"--number must be {LEAST} to {most:,}, got {number:,}")
     if broken := [entry.name for entry in entries if entry.problem or not entry.digest]:
         raise InputError(f"cannot be read: {', '.join(broken)}")
-    digests = {entry.name: entry.digest for entry in entries}
-    key = Key(
-        secret=secrets.token_hex(32),
-        number=number,
-        scenarios=digests,
-        version=version("bridgegen"),
-    )
+    digests, ours = {entry.name: entry.digest for entry in entries}, version("bridgegen")
+    key = Key(secret=secrets.token_hex(32), number=number, scenarios=digests, version=ours)
     key = key.model_copy(update={"commitment": hash_of(key, "commitment")})
     try:
         # Never over another key: its hash may be published.
@@ -151,7 +147,9 @@ def assess(given: SuiteOptions, key_file: Path) -> SuiteRun:
     """
     files = [given.files] if isinstance(given.files, str | Path) else list(given.files)
     key = _read(key_file, Key)
-    key.require(find_entries(files), key_file)
+    key.require(entries := find_entries(files), key_file)
+    if key.number * len(entries) * len({*given.egos}) > MOST:
+        raise InputError(f"variations of all drivers must be {MOST:,} at most: name fewer (--ego)")
     if (given.samples, given.seed, given.matrix) != (SAMPLES, 0, None):
         raise InputError("--samples, --seed and --matrix choose variations, as --assessor does")
     check(given, given.simulator)
@@ -169,7 +167,7 @@ def assess(given: SuiteOptions, key_file: Path) -> SuiteRun:
         failures=_failures(suite.jobs, suite.results),
     )
     made = made.model_copy(update={"seal": hash_of(made, "seal")})
-    write_whole(folder / SEALED, [made.model_dump_json(indent=1).encode()])
+    write_whole(folder / SEALED, [made.model_dump_json().encode()])
     return replace(suite, sealed=made)
 
 
