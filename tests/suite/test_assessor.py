@@ -257,7 +257,7 @@ def test_a_sealed_file_that_was_altered_is_refused(home):
     path, none = suite.folder / SEALED, ()
     text = path.read_text()
     altered = path.with_name("altered.json")
-    altered.write_text(text.replace('"critical": true', '"critical": false', 1))
+    altered.write_text(text.replace('"critical":true', '"critical":false', 1))
     with refuses(InputError, "altered"):
         verify(altered, ["cut-in"], none, none)
 

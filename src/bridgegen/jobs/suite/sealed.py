@@ -117,7 +117,8 @@ def commit(path: Path, files: Sequence[str], number: int) -> list[str]:
         StorageError: the file exists, or cannot be written.
     """
     entries = find_entries(files)
-    if not LEAST <= number <= (most := MOST // len(entries)):
+    most = MOST // len(entries)
+    if not LEAST <= number <= most:
         raise InputError(f"--number must be {LEAST} to {most:,}, got {number:,}")
     if broken := [entry.name for entry in entries if entry.problem or not entry.digest]:
         raise InputError(f"cannot be read: {', '.join(broken)}")
