@@ -46,7 +46,7 @@ def test_a_suite_needs_no_other_word_and_its_help_lists_the_others(cli, monkeypa
     approve(out, "bridgegen", "--junit")
     commands = out.partition("\nCommands:\n")[2]
     assert re.findall(r"^  (suite [a-z]+)  ", commands, re.MULTILINE) == [
-        "suite add", "suite replay",
+        "suite add", "suite replay", "suite commit", "suite verify",
     ]  # fmt: skip
     assert "..." not in commands
     assert max(len(line) for line in out.splitlines()) <= 80

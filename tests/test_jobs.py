@@ -30,7 +30,7 @@ GIVEN = {
     "suite": {
         "files": ("cut-in", "packs"), "egos": ("careful", "exec:python3 my,driver.py"),
         "matrix": "2026", "samples": 3, "seed": 4, "simulator": SimulatorChoice("esmini"),
-        "driver_name": "planner 7", "with_maps": True,
+        "driver_name": "planner 7", "with_maps": True, "assessor": Path("/keys/a.key"),
     },
     "diff": {
         "files": ("cut-in",), "egos": ("careful", "reference"), "matrix": "none", "samples": 3,

@@ -127,6 +127,14 @@ class SuiteOptions(ScenariosOptions):
         ),
     )
     driver_name: str | None = field(default=None, metadata=_of_search("driver_name"))
+    assessor: Path | None = field(
+        default=None,
+        metadata=option(
+            PATH,
+            "Run what an assessor's key ('suite commit') draws instead, and seal the result.",
+            group=SEARCH,
+        ),
+    )
     with_maps: bool = field(
         default=False,
         metadata=option(

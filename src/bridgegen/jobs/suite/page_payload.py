@@ -141,6 +141,7 @@ def payload(
             ],
             "outcomes": [
                 [text for text in (outcomes(suite.of_ego(ego)), points(suite.of_ego(ego))) if text]
+                + suite.drawn_lines(ego)
                 for ego in suite.egos
             ],
             "differences": differences([group for group in complete if len(group) > 1], labels),
