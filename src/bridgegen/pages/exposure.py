@@ -1,13 +1,16 @@
 """A fit as a page without scripts: densities with bands, quantile plots, dependence."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from bridgegen.base.disk import refuse_other
+from bridgegen.base.units import percent
 from bridgegen.pages import templates
 from bridgegen.pages.charts import Plot
 from bridgegen.scenario.exposure.fit import Fit, ParameterFit
+from bridgegen.scenario.exposure.parameterisation import ELEMENTS, NOT_KNOWN, Parameterisation
 
 GENERATOR = "BridgeGen fit"
 DOUBTFUL = 0.05
@@ -53,7 +56,34 @@ def write_page(path: Path, fit: Fit, exposure: Path | None = None) -> None:
         correlated=fit.correlated,
         correlation=fit.correlation.tolist(),
         band=fit.correlation_band.tolist(),
+        twins=_twins(fit.exposure.parameterisation),
     )
+
+
+def _twins(found: Parameterisation | None) -> dict[str, object]:
+    """Return the verdicts of recorded events and of their parameterised twins as tables."""
+    if found is None:
+        return {"says": NOT_KNOWN}
+    rows = [
+        [verdict, driver, *asdict(one).values(), *map(_interval, one.shares().values())]
+        for verdict, of in found.agreement.items()
+        for driver, one in of.items()
+    ]
+    pooled = [(verdict, found.pooled(verdict).changed, of) for verdict, of in
+              found.given_back.items()]  # fmt: skip
+    return {
+        "says": found.sentence(),
+        "source": found.source,
+        "left_out": "; ".join(f"{n} {reason}" for reason, n in found.left_out.items()),
+        "rows": rows,
+        "elements": ELEMENTS,
+        "back": [[verdict, n, *(of.get(e, "–") for e in ELEMENTS)] for verdict, n, of in pooled],
+    }
+
+
+def _interval(share: tuple[float, float, float] | None) -> tuple[str, str]:
+    value, low, high = map(percent, share) if share else ("–", "", "")
+    return value, f"{low} to {high}" if share else ""
 
 
 def _banner(fit: Fit, exposure: Path | None) -> templates.Banner:

@@ -9,7 +9,7 @@ Bands: the 2.5 and 97.5 % quantiles of fits to events that were drawn with repla
 import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -27,6 +27,7 @@ from bridgegen.scenario.exposure.dependence import GaussianCopula
 from bridgegen.scenario.exposure.exposure import WEIGHED, Exposure
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
 from bridgegen.scenario.exposure.marginals import Conditional, Form, Marginal
+from bridgegen.scenario.exposure.parameterisation import Parameterisation
 from bridgegen.scenario.exposure.reader import build_exposure, chosen_exposure, exposure_text
 from bridgegen.scenario.exposure.tables import cell_reader, read_header, read_table
 from bridgegen.scenario.language.exposure_schema import MarginalSection
@@ -138,7 +139,8 @@ class Fit:
     def remarks(self) -> list[str]:
         """Return what a reader must know, a sentence each."""
         broken = [f"{count} events break '{rule}'" for rule, count in self.infeasible.items()]
-        return [*self.outside, *broken, *self.notes]
+        twins = self.exposure.parameterisation
+        return [*self.outside, *broken, *self.notes, *([twins.sentence()] if twins else [])]
 
 
 def fit_exposure(
@@ -151,6 +153,7 @@ def fit_exposure(
     others: Literal["uniform", "default"] | None = None,
     source: str | None = None,
     prior: str | Path | Exposure | None = None,
+    parameterisation: Parameterisation | None = None,
     replicates: int = 200,
     seed: int = 0,
     progress: Progress | None = None,
@@ -168,6 +171,7 @@ def fit_exposure(
         source: where the events come from, for the file.
         prior: an exposure that counts as `LEAST_ROWS` events besides these, see `_weighted`; as for
             `chosen_exposure`.
+        parameterisation: what the parameters leave out of recorded events, for the file.
         replicates: how many times events are resampled, and how many samples the p values take.
         seed: of all chance, at least 0.
         progress: called with the number of parameters done, and of all.
@@ -244,6 +248,7 @@ def fit_exposure(
             **({"others": others} if others else {}),
             "parameters": {name: parameter_fit.section for name, parameter_fit in fitted.items()},
             "dependence": {"correlation": _pairs(correlated, correlation)},
+            **({"parameterisation": asdict(parameterisation)} if parameterisation else {}),
         },
     }
     # The fitted exposure is read from the text that is written, so that the file gives the same
