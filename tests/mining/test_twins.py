@@ -6,13 +6,11 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from tests.approval import refuses
 from tests.mining.events.simulated import located, recorded, simulated
 
-from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.recordings.events.find import find_events
 from bridgegen.recordings.events.scene import Scene
-from bridgegen.recordings.twins import OFF, compare, met_of, twins_of
+from bridgegen.recordings.twins import compare, met_of
 from bridgegen.scenario.language.reader import load
 
 ROWS, DRIVER = 60, "un-r157"
@@ -50,10 +48,10 @@ def agreement(name, ego, change, drivers=(DRIVER,)):
     return compare(load(name), events, drivers, "simulated", left_out)
 
 
-def braking(u):
-    """It brakes by 3 m/s² from a second before the lane change on, for 4 s."""
-    t = np.clip(u + 1.0, 0.0, 4.0)
-    return -1.5 * t * t - 12.0 * np.maximum(u - 3.0, 0.0)
+def pulling_away(u):
+    """It accelerates by 2 m/s² from 1.2 s before the lane change on, for 5 s."""
+    t = np.clip(u + 1.2, 0.0, 5.0)
+    return t * t + 10.0 * np.maximum(u - 3.8, 0.0)
 
 
 def late_braking(u):
@@ -62,28 +60,28 @@ def late_braking(u):
     return -3.0 * t * t - 12.0 * np.maximum(u - 3.0, 0.0)
 
 
-CHANGES = {"none": None, "braking": ("bv", braking), "late braking": ("bv", late_braking)}
+CHANGES = {"none": None, "pulling away": ("bv", pulling_away), "late braking": ("bv", late_braking)}
 
 
 def test_the_parameterised_form_itself_agrees_with_its_twin():
     found = agreement("cut-in", DRIVER, "none")
     assert found.events >= 50
-    pooled = found.pooled("failure")
-    assert pooled.both >= 3
+    assert found.pooled("contact").both >= 10
     for verdict in ("failure", "contact", "collision course"):
-        assert found.pooled(verdict).changed == 0
+        assert (found.pooled(verdict).replay, found.pooled(verdict).twin) == (0, 0)
     assert found.figures() | {"f1": 1.0, "changed": 0.0, "costs_most": None} == found.figures()
-    assert "changes none of the verdicts" in found.sentence()
+    assert "changes none of the verdicts" in found.figures()["says"]
 
 
 def test_an_acceleration_that_no_parameter_has_is_named():
-    found = agreement("cut-in", DRIVER, "braking")
-    figures = found.figures()
+    figures = agreement("cut-in", DRIVER, "pulling away").figures()
+    assert figures["events"] >= 40
     assert figures["changed"] > 0.1
-    assert figures["recall"] < 0.8
+    assert figures["recall"] == 1.0  # who pulls away is less of a danger than its twin
+    assert figures["precision"] < 0.7
     assert figures["costs_most"] == "initial acceleration"
-    assert figures["changed_with_it"] < 0.5 * figures["changed"]
-    assert "Leaving out the initial acceleration costs most" in found.sentence()
+    assert figures["changed_with_it"] < 0.3 * figures["changed"]
+    assert "Leaving out the initial acceleration costs most" in figures["says"]
 
 
 def test_hard_braking_after_the_begin_is_named():
@@ -99,4 +97,4 @@ def test_other_events_agree_with_their_twins(name, ego):
     figures = agreement(name, ego, "none").figures()
     assert figures["events"] >= 40
     assert figures["f1"] > 0.9
-    assert figures["changed"] < 0.05
+    assert figures["changed"] < 0.1  # at the edge of a collision course

@@ -1,6 +1,5 @@
 """A fit as a page without scripts: densities with bands, quantile plots, dependence."""
 
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from bridgegen.base.units import percent
 from bridgegen.pages import templates
 from bridgegen.pages.charts import Plot
 from bridgegen.scenario.exposure.fit import Fit, ParameterFit
-from bridgegen.scenario.exposure.parameterisation import ELEMENTS, NOT_KNOWN, Parameterisation
+from bridgegen.scenario.language.parameterisation import ELEMENTS, NOT_KNOWN, Parameterisation
 
 GENERATOR = "BridgeGen fit"
 DOUBTFUL = 0.05
@@ -65,19 +64,22 @@ def _twins(found: Parameterisation | None) -> dict[str, object]:
     if found is None:
         return {"says": NOT_KNOWN}
     rows = [
-        [verdict, driver, *asdict(one).values(), *map(_interval, one.shares().values())]
+        [verdict, driver, *one.model_dump().values(), *map(_interval, one.shares().values())]
         for verdict, of in found.agreement.items()
         for driver, one in of.items()
     ]
-    pooled = [(verdict, found.pooled(verdict).changed, of) for verdict, of in
-              found.given_back.items()]  # fmt: skip
+    back = [
+        [verdict, one.replay + one.twin, *(of.get(element, "–") for element in ELEMENTS)]
+        for verdict, of in found.given_back.items()
+        for one in [found.pooled(verdict)]
+    ]
     return {
-        "says": found.sentence(),
+        "says": found.figures()["says"],
         "source": found.source,
         "left_out": "; ".join(f"{n} {reason}" for reason, n in found.left_out.items()),
         "rows": rows,
         "elements": ELEMENTS,
-        "back": [[verdict, n, *(of.get(e, "–") for e in ELEMENTS)] for verdict, n, of in pooled],
+        "back": back,
     }
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from bridgegen.assess.conflict.analysis import CONTACT, analyse
 from bridgegen.assess.conflict.harm import COURSE, NEAR_MISS, decisive
 from bridgegen.base.arrays import Bool, Float
-from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.base.errors import InputError, ScenarioError, UnknownNameError
 from bridgegen.drivers import DRIVERS
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.runner import Runner
@@ -26,7 +26,6 @@ from bridgegen.openx.source import OntologySource
 from bridgegen.recordings import TIME_STEP
 from bridgegen.recordings.events.event import ABSENT, Events
 from bridgegen.recordings.events.find import find_events
-from bridgegen.recordings.events.of_scenarios import broken_by
 from bridgegen.recordings.events.scene import Scene
 from bridgegen.recordings.lanes.find import locate, read_map
 from bridgegen.recordings.lanes.model import NONE
@@ -34,14 +33,13 @@ from bridgegen.recordings.readers.clean import clean
 from bridgegen.recordings.readers.formats import files_of, read
 from bridgegen.recordings.readers.states import centre_ahead
 from bridgegen.scenario.exposure.fit import Progress
-from bridgegen.scenario.exposure.parameterisation import (
+from bridgegen.scenario.language.adversary import with_others
+from bridgegen.scenario.language.parameterisation import (
     ELEMENTS,
     VERDICTS,
     Agreement,
     Parameterisation,
 )
-from bridgegen.scenario.language.adversary import with_others
-from bridgegen.scenario.language.kinds import slack
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.ontology.builder import rounded
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
@@ -78,12 +76,8 @@ class Track:
     duration: float
 
 
-@dataclass(frozen=True, eq=False)
-class Met:
-    """An event that is a scenario: its searched parameters, and a track for each other."""
-
-    values: Mapping[str, float]
-    tracks: tuple[Track, ...]
+Met = tuple[Mapping[str, float], list[Track]]
+"""An event that is a scenario: its searched parameters, and a track for each other."""
 
 
 def twins_of(
@@ -134,27 +128,24 @@ def met_of(
     scenario: LogicalScenario, scene: Scene, events: Events, left_out: Counter[str]
 ) -> list[Met]:
     """Return the events of a recording that are a scenario; count the others by reason."""
-    spec, variables = scenario.recorded, scenario.space().variables
+    spec, space, found = scenario.recorded, scenario.space(), list[Met]()
     assert spec is not None
-    rows = {n: v for n, v in spec.values(events.quantities).items() if n in variables}
-    at = np.flatnonzero(np.isfinite([*rows.values()]).all(axis=0) & spec.counts(events.quantities))
-    rows = {name: column[at] for name, column in rows.items()}
-    inside = np.ones(len(at), np.bool_)
-    for name, column in rows.items():
-        low, high = (np.asarray(getattr(scenario.parameters[name], e)) for e in ("low", "high"))
-        inside &= (column >= low - slack(low)) & (column <= high + slack(high))
-    for _, breaks in broken_by(scenario, rows):
-        inside &= ~breaks
-    left_out.update([OUTSIDE] * int((~inside).sum()))
-    found = []
-    for k in np.flatnonzero(inside).tolist():
-        whose = [int(who[at[k]]) for who in events.others.values()]
-        tracks = [_track(scene, events, int(at[k]), who) for who in whose[: len(_others(scenario))]]
-        kept = tuple(track for track in tracks if track is not None)
+    rows = {n: v for n, v in spec.values(events.quantities).items() if n in space.variables}
+    whole = np.isfinite([*rows.values()]).all(axis=0) & spec.counts(events.quantities)
+    roles = [*events.others.values()][: len(_others(scenario))]
+    for i in np.flatnonzero(whole).tolist():
+        values = {name: float(column[i]) for name, column in rows.items()}
+        try:
+            space.row(values)
+        except ScenarioError:
+            left_out[OUTSIDE] += 1
+            continue
+        tracks = [_track(scene, events, i, int(who[i])) for who in roles]
+        kept = [track for track in tracks if track is not None]
         if len(kept) < len(_others(scenario)):
             left_out[OFF] += 1
         else:
-            found.append(Met({name: float(rows[name][k]) for name in rows}, kept))
+            found.append((values, kept))
     return found
 
 
@@ -224,19 +215,27 @@ def compare(
             rollout = player.run(elements)
             good &= rollout.status == 0
             conflicts = analyse(rollout)
-            _, harm = decisive(conflicts)
             contact = (conflicts.kind == CONTACT).any(axis=1)
-            verdicts = (harm >= NEAR_MISS, contact, harm >= COURSE)
+            (_, own), (_, harm) = decisive(conflicts), decisive(conflicts, "any")
+            verdicts = (contact, own >= NEAR_MISS, harm >= COURSE)
             found[driver].append(dict(zip(VERDICTS, verdicts, strict=True)))
     left_out.update([NO_RESULT] * int((~good).sum()))
     agreement: dict[str, dict[str, Agreement]] = {verdict: {} for verdict in VERDICTS}
     back = {verdict: dict.fromkeys(ELEMENTS, 0) for verdict in VERDICTS}
     for (driver, runs), verdict in ((of, v) for of in found.items() for v in VERDICTS if of[1]):
         twin, replay, *others = (run[verdict][good] for run in runs)
-        agreement[verdict][driver] = Agreement.of(replay, twin)
+        pairs = (replay & twin, replay & ~twin, ~replay & twin, ~replay & ~twin)
+        counts = zip(Agreement.model_fields, (int(pair.sum()) for pair in pairs), strict=True)
+        agreement[verdict][driver] = Agreement(**dict(counts))
         for element, other in zip(ELEMENTS, others, strict=True):
             back[verdict][element] += int((other != replay).sum())
-    return Parameterisation(source, int(good.sum()), dict(left_out), agreement, back)
+    return Parameterisation(
+        source=source,
+        events=int(good.sum()),
+        left_out=dict(left_out),
+        agreement=agreement,
+        given_back=back,
+    )
 
 
 class _Player:
@@ -250,7 +249,7 @@ class _Player:
         scenario = with_others(scenario, "scripted")
         space = scenario.space()
         runner = Runner(scenario, space, PipelineOptions(ego=driver))
-        X = np.array([space.row(event.values) for event in events])
+        X = np.array([space.row(values) for values, _ in events])
         rollout = runner.run(X)
         self._names, self._events, self._step = _others(scenario), events, rollout.time_step
         knob = scenario.roads.knobs["lane_width"]
@@ -282,7 +281,7 @@ class _Player:
         time = np.arange(self._motion.shape[3]) * self._step
         u, found = time - np.nan_to_num(self.begin[i]), {}
         for name, motion, track in zip(
-            self._names, self._motion[i], self._events[i].tracks, strict=True
+            self._names, self._motion[i], self._events[i][1], strict=True
         ):
             s, d, turned = _composed(u, motion, track, self._width, elements)
             place = x + s * np.cos(h) - d * np.sin(h), y + s * np.sin(h) + d * np.cos(h)

@@ -11,7 +11,7 @@ from bridgegen.jobs.risk.outcomes import EVENTS, DataBand
 from bridgegen.jobs.risk.result import PAGE, Risk
 from bridgegen.pages.templates import number
 from bridgegen.scenario.exposure.exposure import Rate
-from bridgegen.scenario.exposure.parameterisation import NOT_KNOWN
+from bridgegen.scenario.language.parameterisation import NOT_KNOWN
 
 
 def sentence(risk: Risk) -> str:
@@ -91,7 +91,7 @@ def data_sentence(band: DataBand) -> str:
 def parameters_sentence(risk: Risk) -> str:
     """Return what the exposure's parameters leave out of recorded events."""
     twins = risk.exposure.parameterisation
-    return NOT_KNOWN if twins is None else twins.sentence()
+    return NOT_KNOWN if twins is None else twins.figures()["says"]
 
 
 def elsewhere_sentence(found: Elsewhere) -> str:

@@ -24,9 +24,9 @@ from bridgegen.base.errors import InputError
 from bridgegen.base.statistics import clopper_pearson
 from bridgegen.scenario.exposure.dependence import GaussianCopula
 from bridgegen.scenario.exposure.marginals import Conditional, Marginal
-from bridgegen.scenario.exposure.parameterisation import Parameterisation
 from bridgegen.scenario.language.constraints import order
 from bridgegen.scenario.language.kinds import slack
+from bridgegen.scenario.language.parameterisation import Parameterisation
 from bridgegen.scenario.language.parameters import at
 from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.scenario.language.space import SearchSpace

@@ -9,7 +9,7 @@ Bands: the 2.5 and 97.5 % quantiles of fits to events that were drawn with repla
 import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -27,10 +27,10 @@ from bridgegen.scenario.exposure.dependence import GaussianCopula
 from bridgegen.scenario.exposure.exposure import WEIGHED, Exposure
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
 from bridgegen.scenario.exposure.marginals import Conditional, Form, Marginal
-from bridgegen.scenario.exposure.parameterisation import Parameterisation
 from bridgegen.scenario.exposure.reader import build_exposure, chosen_exposure, exposure_text
 from bridgegen.scenario.exposure.tables import cell_reader, read_header, read_table
 from bridgegen.scenario.language.exposure_schema import MarginalSection
+from bridgegen.scenario.language.parameterisation import Parameterisation
 from bridgegen.scenario.language.parameters import Parameter, nearest
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 from bridgegen.scenario.language.scenario import LogicalScenario
@@ -140,7 +140,7 @@ class Fit:
         """Return what a reader must know, a sentence each."""
         broken = [f"{count} events break '{rule}'" for rule, count in self.infeasible.items()]
         twins = self.exposure.parameterisation
-        return [*self.outside, *broken, *self.notes, *([twins.sentence()] if twins else [])]
+        return [*self.outside, *broken, *self.notes, *([twins.figures()["says"]] if twins else [])]
 
 
 def fit_exposure(
@@ -248,7 +248,7 @@ def fit_exposure(
             **({"others": others} if others else {}),
             "parameters": {name: parameter_fit.section for name, parameter_fit in fitted.items()},
             "dependence": {"correlation": _pairs(correlated, correlation)},
-            **({"parameterisation": asdict(parameterisation)} if parameterisation else {}),
+            **({"parameterisation": parameterisation.model_dump()} if parameterisation else {}),
         },
     }
     # The fitted exposure is read from the text that is written, so that the file gives the same

@@ -16,14 +16,8 @@ from bridgegen.scenario.exposure.dependence import GaussianCopula
 from bridgegen.scenario.exposure.exposure import Encounters, Exposure
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
 from bridgegen.scenario.exposure.marginals import Conditional, Marginal, Shared
-from bridgegen.scenario.exposure.parameterisation import Agreement, Parameterisation
 from bridgegen.scenario.language.distributions import Discrete
-from bridgegen.scenario.language.exposure_schema import (
-    ExposureFile,
-    ExposureSection,
-    FormSection,
-    ParameterisationSection,
-)
+from bridgegen.scenario.language.exposure_schema import ExposureFile, ExposureSection, FormSection
 from bridgegen.scenario.language.parameters import nearest
 from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
 from bridgegen.scenario.language.reader import load, names, pack_names, read_document
@@ -124,13 +118,6 @@ def build_exposure(document: Document, scenario: SearchedScenario, folder: Path 
         except InputError as error:
             place = document.at(("encounters",))
             problems += [f"encounters: {text} ({place})" for text in error.problems]
-    twins = None
-    if given.parameterisation is not None:
-        try:
-            twins = _parameterisation(given.parameterisation)
-        except InputError as error:
-            place = document.at(("parameterisation",))
-            problems += [f"parameterisation: {text} ({place})" for text in error.problems]
     if problems:
         raise ScenarioError(*problems)
     made = Exposure(
@@ -141,36 +128,10 @@ def build_exposure(document: Document, scenario: SearchedScenario, folder: Path 
         encounters,
         given.source,
         document.at(()),
-        twins,
+        given.parameterisation,
     )
     _ = made.feasible_share  # formulas have values everywhere, and constraints leave enough
     return made
-
-
-def read_parameterisation(path: Path) -> Parameterisation | None:
-    """Return what an exposure's file says of recorded twins alone; None where it says nothing.
-
-    Raises:
-        FileFormatError: the file cannot be read.
-        ScenarioError: it breaks a rule.
-        InputError: its counts contradict each other.
-    """
-    document = read_document(path)
-    problems = shape_problems(ExposureFile, document)
-    given = section(ExposureFile, document.data)
-    if given is None:
-        raise ScenarioError(*problems)
-    twins = given.exposure.parameterisation
-    return None if twins is None else _parameterisation(twins)
-
-
-def _parameterisation(given: ParameterisationSection) -> Parameterisation:
-    data = given.model_dump()
-    agreement = {
-        verdict: {driver: Agreement(**counts) for driver, counts in of.items()}
-        for verdict, of in data["agreement"].items()
-    }
-    return Parameterisation(**data | {"agreement": agreement})
 
 
 def _document(source: str | Path) -> tuple[Document, Path | None]:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from bridgegen.scenario.language.parameterisation import Parameterisation
 from bridgegen.scenario.language.schema_types import (
     Formula,
     Number,
@@ -144,38 +145,6 @@ class EncountersSection(ShapedSection):
     """Source of the numbers."""
 
 
-Count = Annotated[int, Field(strict=True, ge=0, le=10**9)]
-
-
-class AgreementSection(ShapedSection):
-    """Numbers of recorded events by verdict of the replay and of its parameterised twin."""
-
-    both: Count
-    """Events in which replay and twin have the verdict."""
-    replay: Count
-    """Events in which the replay alone has it."""
-    twin: Count
-    """Events in which the twin alone has it."""
-    neither: Count
-    """Events in which neither has it."""
-
-
-class ParameterisationSection(ShapedSection):
-    """How verdicts of recorded events, replayed, agree with those of their parameterised twins."""
-
-    source: Text
-    """Recordings of the events."""
-    events: Count
-    """Number of events that were simulated both ways."""
-    left_out: dict[Text, Count] = {}
-    """Numbers of events that were not, by reason."""
-    agreement: dict[Text, Annotated[dict[Text, AgreementSection], Field(max_length=100)]]
-    """Counts by verdict and driver."""
-    given_back: dict[Text, dict[Text, Count]] = {}
-    """Number of verdicts of all drivers that differ if the twin has one thing as recorded, by
-    verdict and thing."""
-
-
 class ExposureSection(ShapedSection):
     """How often a scenario is met, and with which values of its parameters."""
 
@@ -191,8 +160,8 @@ class ExposureSection(ShapedSection):
     """Dependence between the parameters; independent by default."""
     encounters: EncountersSection | None = None
     """Frequency with which the scenario is met."""
-    parameterisation: ParameterisationSection | None = None
-    """What the parameters leave out of the recorded events, as verdicts that change."""
+    parameterisation: Parameterisation | None = None
+    """What the parameters leave out of recorded events, as verdicts that change."""
 
 
 class ExposureFile(ShapedSection):
