@@ -1,16 +1,27 @@
 """Recorded events beside their parameterised twins: which verdicts change, and by what."""
 
+import json
 from collections import Counter
 from dataclasses import replace
 from functools import lru_cache
+from html import escape
 
 import numpy as np
 import pytest
-from tests.mining.events.simulated import located, recorded, simulated
+import yaml
+from tests.approval import approve, refuses
+from tests.mining.events.simulated import located, recorded, simulated, tracks_of
+from tests.recordings.writers import write_states
 
+from bridgegen.base.errors import BridgeGenError, InputError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.runner import Runner
+from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.recordings.events.find import find_events
 from bridgegen.recordings.events.scene import Scene
-from bridgegen.recordings.twins import compare, met_of
+from bridgegen.recordings.twins import compare, met_of, twins_of
+from bridgegen.scenario.exposure import read_exposure
+from bridgegen.scenario.language.parameterisation import NOT_KNOWN, Parameterisation
 from bridgegen.scenario.language.reader import load
 
 ROWS, DRIVER = 60, "un-r157"
@@ -98,3 +109,124 @@ def test_other_events_agree_with_their_twins(name, ego):
     assert figures["events"] >= 40
     assert figures["f1"] > 0.9
     assert figures["changed"] < 0.1  # at the edge of a collision course
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """A folder with a recording, its map, and a table of the events' parameters."""
+    folder = tmp_path_factory.mktemp("drive")
+    _, P, rollout, _ = simulated("cut-in", ROWS, DRIVER)
+    rollout = moved(rollout, *CHANGES["late braking"])
+    tracks, _ = tracks_of(rollout, range(len(rollout.x)))
+    (folder / "recordings").mkdir()
+    write_states(folder / "recordings", tracks, 0.05)
+    runner = Runner(load("cut-in"), load("cut-in").space(), PipelineOptions(ego=DRIVER))
+    model = runner.concrete(runner.space.row({})).roads
+    (folder / "place.xodr").write_bytes(to_xml(model))
+    names = ("ego_speed", "speed_difference", "gap", "cut_in_distance", "change_time")
+    lines = [",".join(names), *(",".join(f"{P[n][i]:.6g}" for n in names) for i in range(ROWS))]
+    (folder / "events.csv").write_text("\n".join(lines), "utf-8")
+    return folder
+
+
+def fit(cli, drive, out, *more):
+    return cli(
+        "fit", "cut-in", drive / "events.csv", "--without-column", "default", "--replicates", 20,
+        "--out", out, "--recordings", drive / "recordings", "--map", drive / "place.xodr", *more,
+    )  # fmt: skip
+
+
+def test_fit_writes_what_the_parameterisation_changes_and_risk_says_it(cli, drive, tmp_path):
+    out = tmp_path / "exposure.yaml"
+    code, text, err = fit(cli, drive, out, "--replay-drivers", DRIVER, "--json")
+    assert code == 0, err
+    stated = json.loads(text)["parameterisation"]
+    assert stated["costs_most"] == "shape of braking"
+    assert stated["changed"] > 0.3
+    assert stated["says"] in err
+    page = out.with_suffix(".html").read_text("utf-8")
+    assert escape(stated["says"], quote=False) in page
+    assert "given back" in page
+    exposure = read_exposure(out)
+    assert exposure.parameterisation.figures() == stated
+
+    code, text, err = cli(
+        "risk", "cut-in", "--exposure", out, "--budget", 200, "--method", "mc", "--out",
+        tmp_path / "risk",
+    )  # fmt: skip
+    assert code in (0, 3), err
+    assert stated["says"] in text
+    assert escape(stated["says"], quote=False) in (tmp_path / "risk" / "risk.html").read_text(
+        "utf-8"
+    )
+    said = json.loads((tmp_path / "risk" / "risk.json").read_text("utf-8"))
+    assert said["exposure"]["parameterisation"] == stated
+
+
+def test_without_replays_it_says_that_it_is_not_known(cli, drive, tmp_path):
+    out = tmp_path / "exposure.yaml"
+    code, text, err = fit(cli, drive, out, "--replay-drivers", "none", "--json")
+    assert code == 0, err
+    assert json.loads(text)["parameterisation"] is None
+    assert escape(NOT_KNOWN, quote=False) in out.with_suffix(".html").read_text("utf-8")
+    assert "parameterisation" not in out.read_text("utf-8")
+
+
+def test_what_cannot_be_replayed_is_refused_in_a_line(cli, drive, tmp_path):
+    out = tmp_path / "exposure.yaml"
+    code, _, err = fit(cli, drive, out, "--replay-drivers", "../mine.py:Driver")
+    assert code == 2
+    approve(err, "driver", "mine.py")
+    (tmp_path / "broken.csv").write_text("time,entity,x\n1,a,nonsense\n", "utf-8")
+    code, _, err = fit(cli, drive, out, "--recordings", tmp_path / "broken.csv")
+    assert code == 2
+    approve(err, "broken.csv")
+    with refuses(InputError, "crossroads-s4", "cut-in, cut-out"):
+        twins_of(load("crossroads-s4"), [drive / "recordings"], [DRIVER])
+    assert not out.exists()
+
+
+def test_no_event_leaves_it_unknown():
+    found = compare(load("cut-in"), [], [DRIVER], "nothing", Counter())
+    figures = found.figures()
+    assert (figures["f1"], figures["changed"], figures["costs_most"]) == (None, None, None)
+    assert "is not known" in figures["says"]
+
+
+COUNTS = {"both": 3, "replay": 1, "twin": 0, "neither": 8}
+BLOCK = {
+    "source": "by hand", "events": 12, "left_out": {"<script>": 2},
+    "agreement": {"failure": {"reference": COUNTS}},
+    "given_back": {"failure": {"initial acceleration": 0, "lateral profile": 1}},
+}  # fmt: skip
+
+
+def test_figures_are_those_of_the_counts_by_hand():
+    found = Parameterisation.model_validate(BLOCK)
+    shares = found.pooled("failure").shares()
+    assert shares["recall"] == pytest.approx((3 / 4, 0.194120, 0.993691), abs=1e-5)
+    assert shares["precision"] == pytest.approx((1.0, 0.292402, 1.0), abs=1e-5)
+    assert shares["f1"][0] == pytest.approx(6 / 7)
+    assert shares["changed"][0] == pytest.approx(1 / 12)
+    assert found.figures()["costs_most"] == "initial acceleration"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"events": 13},
+        {"events": -1},
+        {"agreement": {"luck": {"reference": COUNTS}}},
+        {"agreement": {"failure": {"reference": COUNTS | {"both": 1.5}}}},
+        {"recall": 1.0},
+    ],
+)
+def test_a_block_that_contradicts_itself_is_refused(tmp_path, change):
+    path = tmp_path / "exposure.yaml"
+    data = {
+        "exposure_of": "cut-in",
+        "exposure": {"source": "by hand", "others": "default", "parameterisation": BLOCK | change},
+    }
+    path.write_text(yaml.safe_dump(data), "utf-8")
+    with refuses(BridgeGenError, "parameterisation", "exposure.yaml"):
+        read_exposure(path)

@@ -62,7 +62,7 @@ def write_page(path: Path, fit: Fit, exposure: Path | None = None) -> None:
 def _twins(found: Parameterisation | None) -> dict[str, object]:
     """Return the verdicts of recorded events and of their parameterised twins as tables."""
     if found is None:
-        return {"says": NOT_KNOWN}
+        return {"says": NOT_KNOWN, "rows": []}
     rows = [
         [verdict, driver, *one.model_dump().values(), *map(_interval, one.shares().values())]
         for verdict, of in found.agreement.items()

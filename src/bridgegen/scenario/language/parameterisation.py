@@ -16,7 +16,7 @@ one that changes less must not hide it."""
 ELEMENTS = ("initial speed", "initial acceleration", "shape of braking", "lateral profile")
 """What of the recorded motion of the others is put back, one at a time."""
 NOT_KNOWN = (
-    "What its parameters leave out of recorded events is not known: 'bridgegen fit --recordings' "
+    "What its parameters leave out of recorded events is not known: bridgegen fit --recordings "
     "counts it."
 )
 """What is said of an exposure that was not compared."""
