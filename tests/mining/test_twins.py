@@ -19,9 +19,9 @@ from bridgegen.engine.runner import Runner
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.recordings.events.find import find_events
 from bridgegen.recordings.events.scene import Scene
-from bridgegen.recordings.twins import compare, met_of, twins_of
+from bridgegen.recordings.twins import Track, _composed, compare, met_of, twins_of
 from bridgegen.scenario.exposure import read_exposure
-from bridgegen.scenario.language.parameterisation import NOT_KNOWN, Parameterisation
+from bridgegen.scenario.language.parameterisation import ELEMENTS, NOT_KNOWN, Parameterisation
 from bridgegen.scenario.language.reader import load
 
 ROWS, DRIVER = 60, "un-r157"
@@ -184,6 +184,31 @@ def test_what_cannot_be_replayed_is_refused_in_a_line(cli, drive, tmp_path):
     with refuses(InputError, "crossroads-s4", "cut-in, cut-out"):
         twins_of(load("crossroads-s4"), [drive / "recordings"], [DRIVER])
     assert not out.exists()
+
+
+def test_elements_are_put_back_one_at_a_time():
+    """By hand: 20 m/s and 2 m/s² more than the twin's 18 m/s, a lane change from the right."""
+    u = np.arange(-20, 60) / 10
+    twin = np.array([18.0 * u, 3.75 * np.clip(1.0 - u / 4.0, 0.0, 1.0), 0.0 * u, 18.0 + 0.0 * u])
+    time = np.arange(0, 31) / 10
+    recorded = np.array([
+        time, 20.0 * time + time**2, np.clip(time / 3.0, 0.0, 1.0) - 1.0, 0.1 + 0.0 * time,
+        20.0 + 2.0 * time,
+    ])  # fmt: skip
+    track, at = Track(recorded, 20.0, 2.0, 3.0), 50  # u = 3 s
+    assert u[at] == pytest.approx(3.0)
+    expected = {
+        (): 54.0, ("initial speed",): 60.0, ("initial acceleration",): 63.0,
+        ("shape of braking",): 54.0, ELEMENTS: 69.0,
+    }  # fmt: skip
+    for elements, way in expected.items():
+        s, d, h = _composed(u, twin, track, 3.75, elements)
+        assert s[at] == pytest.approx(way), elements
+        assert s[:11] == pytest.approx(18.0 * u[:11] - ("initial speed" in elements))
+        assert (np.diff(s) >= 0.0).all()
+        aside = (0.0, -0.1) if elements == ELEMENTS else (3.75 / 4.0, 0.0)
+        assert (d[at], h[at]) == pytest.approx(aside)  # mirrored: there is no lane on the right
+    assert d[20] == pytest.approx(3.75)
 
 
 def test_no_event_leaves_it_unknown():

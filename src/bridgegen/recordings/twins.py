@@ -34,6 +34,7 @@ from bridgegen.recordings.readers.formats import files_of, read
 from bridgegen.recordings.readers.states import centre_ahead
 from bridgegen.scenario.exposure.fit import Progress
 from bridgegen.scenario.language.adversary import with_others
+from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 from bridgegen.scenario.language.parameterisation import (
     ELEMENTS,
     VERDICTS,
@@ -105,10 +106,12 @@ def twins_of(
         raise UnknownNameError("driver that ships", unknown[0], tuple(DRIVERS))
     story, spec = scenario.story, scenario.recorded
     plain = scenario.roads.template == "road" and not (story.jams or story.works)
-    if spec is None or spec.event not in KINDS or not plain or scenario.effects:
+    roles = EVENT_KINDS[spec.event].roles if spec and spec.event in KINDS else ()
+    if spec is None or len(_others(scenario)) > len(roles) or not plain or scenario.effects:
         raise InputError(
             f"{scenario.name}: replays beside parameterised twins need the key 'recorded' with an "
-            f"event of {', '.join(KINDS)}, on a road without junctions, jams, works and effects"
+            f"event of {', '.join(KINDS)}, no participants that it has not, and a road without "
+            "junctions, jams, works and effects"
         )
     on_map = read_map(road_map) if road_map is not None else None
     found, left_out, names = list[Met](), Counter[str](), list[str]()
@@ -262,7 +265,8 @@ class _Player:
         cosine, sine = np.cos(h), np.sin(h)
         motion = dx * cosine + dy * sine, dy * cosine - dx * sine, rollout.h - h, rollout.v
         self._motion = np.stack(motion, axis=2)[:, 1:]
-        self.begin = _begin(rollout, self._motion)
+        ended = rollout.n_steps < rollout.shape[2]  # from then on nobody moves
+        self.begin = np.where(ended, np.nan, _begin(rollout, self._motion))
         still = replace(scenario, story=replace(scenario.story, events=()))
         made = OntologySource(still, driver).concrete(space.values(X[0]), "", self._courses(0, ()))
         self._simulator = EmbeddedSimulator(made.storyboard, scenario.name, others="scripted")
@@ -318,6 +322,10 @@ def _composed(
     for name, part in zip(ELEMENTS, (speed, gain, rest), strict=False):
         s = s + part if name in elements else s
     if ELEMENTS[3] in elements:
+        # A lane change to the other side is mirrored: there, the scenario may have no lane.
+        far, here = (float(one[np.argmax(np.abs(one))]) for one in (aside, d / width))
+        if far * here < 0.0 and min(abs(far), abs(here)) > 0.5:
+            aside, turned = -aside, -turned
         path = width * np.interp(known, time, aside)
         d = np.where(after, path, d + rise * (path[0] - float(np.interp(0.0, u, d))))
         h = np.where(after, np.interp(known, time, turned) * (u <= time[-1]), h)

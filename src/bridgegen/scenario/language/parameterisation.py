@@ -133,8 +133,7 @@ class Parameterisation(ShapedSection):
                 f"of {n}: {self.events} recorded events, {drivers}); {happens} have it, {scores}."
             )
             if most:
-                left = percent(back[most] / n) if back[most] else "none"
-                says += f" Leaving out the {most} costs most: given back, {left} change."
+                says += f" Leaving out the {most} costs most: given back, {back[most]} change."
             elif changed:
                 says += f" Giving back {' or '.join(back)} alone mends none." if back else ""
         return {
