@@ -9,7 +9,7 @@ from bridgegen.base.units import percent
 from bridgegen.pages import templates
 from bridgegen.pages.charts import Plot
 from bridgegen.scenario.exposure.fit import Fit, ParameterFit
-from bridgegen.scenario.language.parameterisation import ELEMENTS, NOT_KNOWN, Parameterisation
+from bridgegen.scenario.language.parameterisation import ELEMENTS, Parameterisation
 
 GENERATOR = "BridgeGen fit"
 DOUBTFUL = 0.05
@@ -55,6 +55,7 @@ def write_page(path: Path, fit: Fit, exposure: Path | None = None) -> None:
         correlated=fit.correlated,
         correlation=fit.correlation.tolist(),
         band=fit.correlation_band.tolist(),
+        says=fit.exposure.left_out,
         twins=_twins(fit.exposure.parameterisation),
     )
 
@@ -62,7 +63,7 @@ def write_page(path: Path, fit: Fit, exposure: Path | None = None) -> None:
 def _twins(found: Parameterisation | None) -> dict[str, object]:
     """Return the verdicts of recorded events and of their parameterised twins as tables."""
     if found is None:
-        return {"says": NOT_KNOWN, "rows": []}
+        return {"rows": []}
     rows = [
         [verdict, driver, *one.model_dump().values(), *map(_interval, one.shares().values())]
         for verdict, of in found.agreement.items()
@@ -74,7 +75,6 @@ def _twins(found: Parameterisation | None) -> dict[str, object]:
         for one in [found.pooled(verdict)]
     ]
     return {
-        "says": found.figures()["says"],
         "source": found.source,
         "left_out": "; ".join(f"{n} {reason}" for reason, n in found.left_out.items()),
         "rows": rows,

@@ -50,7 +50,7 @@ def print_fit(fit: "Fit", written: "Sequence[Path]", *, as_json: bool) -> None:
         as_json=False,
     )
     print()
-    for text in fit.facts():
+    for text in (*fit.facts(), fit.exposure.left_out):
         print(text)
     print()
     for path in written:

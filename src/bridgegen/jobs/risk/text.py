@@ -11,7 +11,6 @@ from bridgegen.jobs.risk.outcomes import EVENTS, DataBand
 from bridgegen.jobs.risk.result import PAGE, Risk
 from bridgegen.pages.templates import number
 from bridgegen.scenario.exposure.exposure import Rate
-from bridgegen.scenario.language.parameterisation import NOT_KNOWN
 
 
 def sentence(risk: Risk) -> str:
@@ -57,7 +56,7 @@ def lines(risk: Risk) -> Iterator[str | Table]:
         yield f"{'check':<12}{value} ({width}) in {risk.check.evaluations:,} by mc"
     if risk.data is not None:
         yield f"{'data':<12}{data_sentence(risk.data)}"
-    yield f"{'parameters':<12}{parameters_sentence(risk)}"
+    yield f"{'parameters':<12}{risk.exposure.left_out}"
     if risk.elsewhere is not None:
         yield f"{'elsewhere':<12}{elsewhere_sentence(risk.elsewhere)}"
     yield f"{'page':<12}{risk.folder / PAGE}"
@@ -86,12 +85,6 @@ def data_sentence(band: DataBand) -> str:
         f"Few data: with exposures of resampled events the estimate is {number(band.low)} to "
         f"{number(band.high)} (95 % of {band.exposures})."
     )
-
-
-def parameters_sentence(risk: Risk) -> str:
-    """Return what the exposure's parameters leave out of recorded events."""
-    twins = risk.exposure.parameterisation
-    return NOT_KNOWN if twins is None else twins.figures()["says"]
 
 
 def elsewhere_sentence(found: Elsewhere) -> str:

@@ -26,7 +26,7 @@ from bridgegen.scenario.exposure.dependence import GaussianCopula
 from bridgegen.scenario.exposure.marginals import Conditional, Marginal
 from bridgegen.scenario.language.constraints import order
 from bridgegen.scenario.language.kinds import slack
-from bridgegen.scenario.language.parameterisation import Parameterisation
+from bridgegen.scenario.language.parameterisation import NOT_KNOWN, Parameterisation
 from bridgegen.scenario.language.parameters import at
 from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.scenario.language.space import SearchSpace
@@ -220,6 +220,12 @@ class Exposure:
         """What of it is a prior, as its source says since it was fitted; "" if nothing is."""
         _, found, told = self.source.partition(WEIGHED)
         return f"{found}{told}".strip()
+
+    @property
+    def left_out(self) -> str:
+        """What its parameters leave out of recorded events, in sentences."""
+        twins = self.parameterisation
+        return str(twins.figures()["says"]) if twins else NOT_KNOWN
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -139,8 +139,7 @@ class Fit:
     def remarks(self) -> list[str]:
         """Return what a reader must know, a sentence each."""
         broken = [f"{count} events break '{rule}'" for rule, count in self.infeasible.items()]
-        twins = self.exposure.parameterisation
-        return [*self.outside, *broken, *self.notes, *([twins.figures()["says"]] if twins else [])]
+        return [*self.outside, *broken, *self.notes]
 
 
 def fit_exposure(

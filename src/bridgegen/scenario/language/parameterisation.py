@@ -134,8 +134,11 @@ class Parameterisation(ShapedSection):
             )
             if most:
                 says += f" Leaving out the {most} costs most: given back, {back[most]} change."
-            elif changed:
-                says += f" Giving back {' or '.join(back)} alone mends none." if back else ""
+            elif changed and back:
+                says += f" Giving back {' or '.join(back)} alone mends none."
+            elif not changed:
+                high = clopper_pearson(0, self.events)[1]
+                says += f" With 95 % confidence it changes less than {percent(high)} of them."
         return {
             "events": self.events,
             "drivers": self.drivers,
