@@ -180,6 +180,13 @@ def test_what_cannot_be_replayed_is_refused_in_a_line(cli, drive, tmp_path):
     code, _, err = fit(cli, drive, out, "--recordings", tmp_path / "broken.csv")
     assert code == 2
     approve(err, "broken.csv")
+    (tmp_path / "empty").mkdir()
+    code, _, err = fit(cli, drive, out, "--recordings", tmp_path / "empty")
+    assert code == 2
+    approve(err, "empty")
+    code, _, err = fit(cli, drive, tmp_path / "nowhere" / "exposure.yaml")
+    assert code == 2
+    approve(err, "nowhere")
     with refuses(InputError, "crossroads-s4", "cut-in, cut-out"):
         twins_of(load("crossroads-s4"), [drive / "recordings"], [DRIVER])
     assert not out.exists()

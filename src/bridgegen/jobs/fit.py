@@ -81,6 +81,8 @@ def write_fit(
     logical, drivers = load(scenario), replay_drivers.split(",")
     twins = None
     if recordings and replay_drivers != "none":
+        if not out.parent.is_dir():  # minutes of replays must not be lost
+            raise StorageError(f"{out}: there is no folder {out.parent}")
         # Late, because it compiles: a fit without recordings simulates nothing.
         from bridgegen.recordings.twins import twins_of
 

@@ -122,8 +122,8 @@ def twins_of(
             kinds = find_events(traffic, located).kinds
             events = next(kind for kind in kinds if kind.kind.name == spec.event)
             found += met_of(scenario, Scene(traffic, located), events, left_out)
-            names.append(traffic.facts.name)
-    shown = ", ".join(names[:5]) + ", …" * (len(names) > 5)
+            names.append(traffic.facts.name.strip()[:80] or "unnamed")
+    shown = ", ".join(names[:5]) + ", …" * (len(names) > 5) or "no recording"
     return compare(scenario, found, drivers, shown, left_out, progress)
 
 
