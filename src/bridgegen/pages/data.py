@@ -262,6 +262,7 @@ class ReportData:
         screened: how far the run's screen agrees, as `screened_payload` returns it.
         happening: which events began, and who came near the ego, if the run recorded it.
         simulation: what the page simulates with; see `simulation_payload`. None: it does not.
+        beside: pages of other analyses of the run, files of its folder.
         alone: whether the page is about its only exported scenario, see `only`.
     """
 
@@ -281,6 +282,7 @@ class ReportData:
     screened: Mapping[str, Any] | None = None
     happening: Happening | None = None
     simulation: Mapping[str, Any] | None = None
+    beside: tuple[str, ...] = ()
     alone: bool = False
 
     def __post_init__(self) -> None:

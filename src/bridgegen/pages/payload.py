@@ -172,6 +172,7 @@ def _summary(data: ReportData) -> dict[str, Any]:
         "command": s.command,
         "view": s.view,
         "next": s.keep,
+        "beside": data.beside,
         "critical_distance": _number(s.critical_distance),
         "hard_braking": HARD_BRAKING,
         "harm": s.harm,

@@ -264,6 +264,8 @@ def _found_lines(found: "Triage") -> list[str]:
         lines.append(f"N{found.bound.not_counted[1:]}")
     if found.missed:
         lines.append(f"Time step: {steps_in_words(found)}")
+    if found.extrapolated:
+        lines.append(f"Extrapolated: {found.extrapolated}")
     return lines
 
 

@@ -27,9 +27,12 @@ from bridgegen.jobs.credibility.figures import (
 from bridgegen.jobs.credibility.form import FILE as FORM_FILE
 from bridgegen.jobs.credibility.form import read_form, write_form
 from bridgegen.jobs.credibility.items import ASKED, CHAPTERS, SOURCES, Asked
+from bridgegen.jobs.credibility.measured import FEWEST, TEMPLATE, compare, read_measured
+from bridgegen.jobs.credibility.measured import FILE as MEASURED
 from bridgegen.jobs.credibility.model import FILE, Dossier, Gap, Item
 from bridgegen.jobs.credibility.options import CredibilityOptions
 from bridgegen.jobs.credibility.page import GENERATOR, PAGE, page, worst
+from bridgegen.jobs.credibility.region import regions, warning
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.safety_case.context import assumptions
 from bridgegen.jobs.safety_case.facts import Facts, Files, read_facts, run_facts
@@ -38,10 +41,12 @@ from bridgegen.jobs.safety_case.numbers import RUN, TRIAGE, Numbers, statement
 from bridgegen.jobs.search.exported import FOLDER as SCENARIOS
 from bridgegen.jobs.view.overview import MOST_RUNS, find_folders
 from bridgegen.results.confirmation.record import PREFIX, SUFFIX
+from bridgegen.results.validated import FILE as VALIDATED
+from bridgegen.results.validated import Validated
 
 FOLDER, SCRIPT, GAPS = "dossier", "recompute.py", "gaps.txt"
 
-Details = Mapping[str, Sequence[str]]
+Details = dict[str, Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -133,17 +138,36 @@ def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
         if (path := facts.run.folder / EXPOSURE).is_file():
             of_run.add(path, "how its parameters are distributed on roads", "")
         evidence += of_run.all
-    numbers = measure(runs)
+    numbers, more = measure(runs), Numbers(EVERY)
+    tests = read_measured(out, runs)
+    comparisons = compare(tests, more)
+    validated = regions(runs, tests, comparisons)
+    if validated:
+        more.add("regions", len(validated), source=VALIDATED)
+    if comparisons:
+        of_run.add(out / MEASURED, "results of real tests", "")
+        evidence.append(of_run.all[-1])
     rows = is_compiled()  # else to compare these takes minutes
     different, distributions = differences(rows=rows), installed()
-    more = Numbers(EVERY)
     more.add("bits_compared", len(FUNCTIONS) + rows, again="bridgegen doctor")
     more.add("bits_different", len(different), again="bridgegen doctor")
     more.add("installed", len(distributions), again="python -m pip list")
     more.add("files", len(evidence), source=FILE)
     numbers |= {number.id: number for number in more.all}
     details = _added(runs, numbers, different)
+    spans = [
+        f"{_plain(one.scenario)}, vehicle {one.vehicle}, {_plain(one.evidence)}: "
+        + _plain("; ".join(map(one.side, one.ranges)) + ".")
+        for one in validated
+    ]
+    details["10.2"] = spans + [
+        f"{name}: {_plain(said)}."
+        for name, one in runs.items()
+        if (said := warning(one, validated))
+    ]
     notes = _notes(found, numbers, rows=rows)
+    if any(one.verdict != "accepted" or one.tests < FEWEST for one in comparisons):
+        notes["8.3"] = "not all are accepted, from 6 tests or more"
     items = tuple(
         _filled(
             replace(
@@ -177,6 +201,8 @@ def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
         numbers=tuple(numbers.values()),
         items=items,
         flips=tuple(flips(runs)),
+        comparisons=tuple(comparisons),
+        validated=tuple(validated),
         gaps=(*found.gaps, *of_items),
         installed=distributions,
         evidence=tuple(evidence),
@@ -322,7 +348,7 @@ class Exported:
             Table(("item", "status", "claim"), rows),
             f"\n{'page':<12}{self.page}",
             f"{'gaps':<12}{self.folder / GAPS}",
-            f"{'yours':<12}{self.folder / FORM_FILE}",
+            f"{'yours':<12}{self.folder / FORM_FILE}, {self.folder / MEASURED}",
             f"{'check it':<12}python {self.folder / SCRIPT}",
         ]
 
@@ -373,14 +399,19 @@ def export_credibility(given: CredibilityOptions) -> Exported:
     except OSError as error:
         raise StorageError(f"{out}: cannot be written: {error.strerror}") from None
     write_form(out)
+    if not (out / MEASURED).exists():
+        write_whole(out / MEASURED, [TEMPLATE.encode()])
     data = dossier.model_dump_json(indent=1).encode("utf-8", "replace") + b"\n"
     write_whole(out / FILE, [data])
+    regions_data = Validated(regions=dossier.validated).model_dump_json(indent=1).encode()
+    write_whole(out / VALIDATED, [regions_data, b"\n"])
     write_whole(out / PAGE, [page(dossier, data)])
     lines = [f"{gap.place}: {gap.why}" + f" [{gap.command}]" * bool(gap.command) + "\n"
              for gap in dossier.gaps]  # fmt: skip
     write_whole(out / GAPS, ["".join(lines).encode("utf-8", "replace")])
-    script = files("bridgegen.jobs.credibility").joinpath(SCRIPT).read_bytes()
-    write_whole(out / SCRIPT, [script])
+    for script in (SCRIPT, "recompute_real.py"):
+        code = files("bridgegen.jobs.credibility").joinpath(script).read_bytes()
+        write_whole(out / script, [code])
     return Exported(dossier, out)
 
 

@@ -14,6 +14,7 @@ from bridgegen.jobs.credibility.convergence import (
     QUANTITIES,
     STEPS,
     Convergence,
+    finest,
     series,
     state,
 )
@@ -126,13 +127,14 @@ def _of_steps(runs: Sequence[Facts], numbers: Numbers) -> None:
             add(f"{name}_at", len(at), of=str(steps))
             add(f"{name}_kept", sum(state(a) == state(b) for a, b in at), of=str(steps))
     for quantity, unit in QUANTITIES.items():
-        rows = [row for row in (series(check, quantity) for check in findings) if row is not None]
+        found = [(check, series(check, quantity)) for check in findings]
+        rows = [(check, row) for check, row in found if row is not None]
         if not rows:
             continue
-        made = [Convergence.of(row) for row in rows]
+        made = [Convergence.of(row, finest(check, quantity)) for check, row in rows]
         add("series", len(made), of=quantity)
-        add("unchanged", sum(max(row) == min(row) for row in rows), of=quantity)
-        for name in ("error", "extrapolated", "gci"):
+        add("unchanged", sum(len(set(row)) == 1 for _, row in rows), of=quantity)
+        for name in ("error", "extrapolated", "gci", "stated"):
             values = [getattr(one, name) for one in made]
             add(f"{name}_median", median(values), "number", of=quantity, unit=unit)
             add(f"{name}_q95", float(np.quantile(values, 0.95)), "number", of=quantity, unit=unit)

@@ -54,6 +54,7 @@ JOB = Job(
         "findings": "findings that were simulated at fractions of the time step",
         "flips": "of them, those whose verdict or kind of conflict depends on the time step",
         "sample_flips": "evaluations without failure, of a sample, that depend on it",
+        "refused": "comparisons with real tests whose area is beyond its threshold",
     },
     example="flips > 0",
     fails="a run could not be read",

@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterator
 
+from bridgegen.jobs.credibility.measured import FEWEST
 from bridgegen.jobs.credibility.model import FILE, Dossier, Item
 from bridgegen.pages import templates
 from bridgegen.pages.templates import Banner, Cell, counted
@@ -20,6 +21,7 @@ _KINDS = {
     "yours": "state open",
     "gap": "state bad",
 }
+_VERDICTS = {"accepted": "state ok", "not accepted": "state bad"}
 _MEANING = {
     "filled": "by figures that a script recomputes, or by the installed package",
     "partly": "in part; the reason stands below it",
@@ -47,6 +49,9 @@ def _worst(dossier: Dossier, different: float | str) -> Iterator[str]:
     if dossier.unread:
         yield f"{counted(dossier.unread, 'run')} of {dossier.unread + len(dossier.runs):,} could " \
               "not be read."  # fmt: skip
+    if refused := int(figures["refused"]):
+        yield f"Simulation and real tests differ by more than is accepted in {refused:,} of " \
+              f"{counted(len(dossier.comparisons), 'comparison')}."  # fmt: skip
     flips, findings = int(figures["flips"]), int(figures["findings"])
     if flips:
         yield f"{flips:,} of {counted(findings, 'finding')} {'hangs' if flips == 1 else 'hang'} " \
@@ -69,10 +74,11 @@ def page(dossier: Dossier, data: bytes) -> bytes:
         data: its JSON file, whose digest the page states.
     """
     figures = dossier.figures
-    bad = dossier.unread or figures["flips"]
+    bad = dossier.unread or figures["flips"] or figures["refused"]
     missing = figures["yours"] or figures["gap"]
     kind, word = ("open", "INCOMPLETE") if bad or missing else ("passes", "COMPLETE")
     name = {run.id: f"{run.scenario} with {run.ego}" for run in dossier.runs}
+    text = {number.id: number.text for number in dossier.numbers}
     return templates.page(
         "jobs/credibility/page.html",
         title="Credibility of the toolchain",
@@ -91,6 +97,21 @@ def page(dossier: Dossier, data: bytes) -> bytes:
                 flip.text,
             )
             for flip in dossier.flips[:MOST_FLIPS]
+        ],
+        compared=[
+            (
+                Cell(f"{one.run}, {one.series}", (name[one.run],)),
+                f"{one.quantity} [{one.unit}]",
+                Cell(f"{one.tests:,}", (f"fewer than {FEWEST}",) if one.tests < FEWEST else ()),
+                *(text.get(f"all.{of}:{k}", "–") for of in ("measured_mean", "simulated_mean")),
+                Cell(
+                    text.get(f"all.area:{k}", "–"),
+                    (" to ".join(text.get(f"all.area_{end}:{k}", "–") for end in ("low", "high")),),
+                ),
+                "–" if one.threshold is None else f"{one.threshold:g}",
+                Cell(one.verdict, kind=_VERDICTS.get(one.verdict, "state open")),
+            )
+            for k, one in enumerate(dossier.comparisons[:MOST_FLIPS], start=1)
         ],
         more_flips=len(dossier.flips[MOST_FLIPS:]),
         gaps=[(gap.place, Cell(gap.why, code=gap.command)) for gap in dossier.gaps],
