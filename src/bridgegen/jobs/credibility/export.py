@@ -15,7 +15,15 @@ from bridgegen.base.statistics import CONFIDENCE
 from bridgegen.drivers import file_of
 from bridgegen.engine.conformance import differences
 from bridgegen.engine.options import called_with
-from bridgegen.jobs.credibility.figures import EVERY, SENSITIVITY, flips, installed, measure
+from bridgegen.jobs.credibility.figures import (
+    EVERY,
+    EXPOSURE,
+    SENSITIVITY,
+    flips,
+    installed,
+    measure,
+    twins_of,
+)
 from bridgegen.jobs.credibility.form import FILE as FORM_FILE
 from bridgegen.jobs.credibility.form import read_form, write_form
 from bridgegen.jobs.credibility.items import ASKED, CHAPTERS, SOURCES, Asked
@@ -64,6 +72,7 @@ def read(folders: Sequence[Path]) -> Read:
         try:
             _refuse_links(folder)
             facts = read_facts(folder)
+            twins_of(folder)
         except (BridgeGenError, OSError) as error:
             problems = error.problems if isinstance(error, BridgeGenError) else [str(error)]
             unread.append(Gap(place=str(folder), why="; ".join(problems)[:4000]))
@@ -80,7 +89,7 @@ def _refuse_links(folder: Path) -> None:
         StorageError: that it is.
     """
     # A run may come from another person: figures and digests of this user's files are not its own.
-    names = (RUN, f"{RUN}-wal", f"{RUN}-shm", TRIAGE, SENSITIVITY, SCENARIOS)
+    names = (RUN, f"{RUN}-wal", f"{RUN}-shm", TRIAGE, SENSITIVITY, EXPOSURE, SCENARIOS)
     for path in (*(folder / name for name in names), *folder.glob(f"{PREFIX}*{SUFFIX}")):
         try:
             inside = path.resolve().is_relative_to(folder.resolve())
@@ -126,6 +135,8 @@ def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
         of_run = Files(facts, number, out)
         if (path := facts.run.folder / SENSITIVITY).is_file():
             of_run.add(path, "which constants of the models its verdicts depend on", "")
+        if (path := facts.run.folder / EXPOSURE).is_file():
+            of_run.add(path, "how its parameters are distributed on roads", "")
         evidence += of_run.all
     numbers, more = measure(runs), Numbers(EVERY)
     tests = read_measured(out, runs)
@@ -213,6 +224,11 @@ def _added(
         f"95 % interval {{all.confirmed_low:{k}}} to {{all.confirmed_high:{k}}}."
         for k, number in enumerate(ran, start=1)
     ]
+    recorded = [
+        _plain(f"{name}: {found.figures()['says']}")
+        for name, facts in runs.items()
+        if (found := twins_of(facts.run.folder))
+    ]
     return {
         "3.1": [_plain(text) for text, _ in assumptions([*runs.values()])] if runs else [],
         "4.1": [
@@ -224,7 +240,9 @@ def _added(
         ],
         "5.1": [f"Differs: {name}." for name in different],
         "8.1": simulators,
+        "8.2": recorded,
         "9.3": simulators,
+        "9.5": recorded,
         "9.1": [
             _plain(f"{name}, {facts.triage.scenario} with {facts.ego}: ")
             + (f"{{{name}.share_low}}" if f"{name}.share_low" in numbers else "0 %")

@@ -79,6 +79,16 @@ SENSITIVITY = "bridgegen analyse sensitivity RUN"
 _AGAIN, _CONFIRM = "bridgegen resume RUN", "bridgegen confirm RUN"
 _FULL = "bridgegen search SCENARIO --triage full"
 _RANDOM = "bridgegen search SCENARIO --algorithm random"
+_FIT = "bridgegen fit SCENARIO EVENTS --recordings TRAFFIC --out RUN/exposure.yaml"
+_RECORDED = (
+    "{all.recorded} of {all.runs} runs have exposure.yaml with recorded events that were replayed "
+    "beside their parameterised twins."
+)
+_TWINS = (
+    "Verdicts with the others as recorded and as the parameters say, all else the same; recall, "
+    "precision, F1 (de Gelder and Op den Camp, arXiv:2409.01117). Figures are in that file."
+)
+_UNTWINNED = "recorded events that were replayed beside their parameterised twins"
 _UNCONFIRMED = "No run is confirmed in another simulator"
 _CHOSEN = (
     "They are chosen and not drawn: the interval is that of as many random ones. Clopper and "
@@ -221,8 +231,9 @@ ASKED: tuple[Asked, ...] = (
           "not known", fill=SENSITIVITY),
     Asked("8.1", "Other simulators", "Exported scenarios, simulated again elsewhere.", how=_CHOSEN,
           again=_CONFIRM, needs=("confirmed:1",), gap=_UNCONFIRMED, fill=_CONFIRM),
-    Asked("8.2", "Recordings", needs=("recorded",), gap="Recorded events are not replayed beside "
-          "their parameterised twins; no command of this version does so"),
+    Asked("8.2", "Recordings", _RECORDED, how=_TWINS, again=_FIT, needs=("recorded",),
+          note="two simulations are compared, and neither with what the recorded drivers did",
+          gap=f"No run has exposure.yaml with {_UNTWINNED}", fill=_FIT),
     Asked("8.3", "Real tests: area metric", "{all.tests} tests in {all.comparisons} comparisons: "
           "{all.accepted} within the threshold, {all.refused} not, {all.undecided} not decided, "
           "{all.without} without a threshold, {all.valueless} without a simulated value.",
@@ -253,8 +264,10 @@ ASKED: tuple[Asked, ...] = (
           how="As 6.1 and 6.2.", again=_AGAIN, needs=("findings_flips", "sample_flips"),
           gap="Findings, or a sample of the others, were not simulated at finer steps",
           fill=_FULL),
-    Asked("9.5", "Parameterisation", needs=("twins",), gap="What the parameters of a scenario "
-          "leave out of what was recorded is not measured; no command of this version does so"),
+    Asked("9.5", "Parameterisation", "As 8.2.", how=_TWINS, again=_FIT, needs=("recorded",),
+          note="of the events of those recordings and the drivers that are named, not of the run's",
+          gap="What the parameters leave out of what was recorded is not known: no run has "
+          f"exposure.yaml with {_UNTWINNED}", fill=_FIT),
     Asked("9.6", "Combined: sampling and time step", "Upper bounds of the harmful share at a finer "
           "time step.", again=RECOMPUTE, needs=("combined",), fill=_RANDOM,
           how="high + (1 − high) · f: high is the upper end of 9.1, f that of the share of "

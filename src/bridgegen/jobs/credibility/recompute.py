@@ -76,8 +76,9 @@ def of_run(run: dict[str, Any], folder: Path) -> dict[str, Any]:
     found = {name: ask("count(*)", text) for name, text in where.items()}
     found["same"] = sum(ask(harm, f"id = {row:d}") == at[0]["harm"] for row, at in checks)
     found |= {"folder": folder, "version": about["version"], "checks": checks, "runs": 1}
+    fits = [p.read_bytes().find(b"\n  parameterisation:") > 0 for p in folder.glob("exposure.yaml")]
     found |= {"checked": len(checks), "distributions": distribution is not None}
-    found["sensitivity"] = (folder / "sensitivity.json").is_file()
+    found |= {"sensitivity": (folder / "sensitivity.json").is_file(), "recorded": any(fits)}
     edges = [names[4 + about["parameters"].index(name)] for name in run["edges"]]
     rows = sql.execute(f"SELECT {', '.join(edges) or 1} FROM evaluations WHERE status = 0")
     inside = {tuple(map(bisect_right, run["edges"].values(), row)) for row in rows}
@@ -177,8 +178,7 @@ def check(base: Path) -> Iterator[tuple[str, Any, Any, bool | None]]:
             if said["template"] and made != said["text"]:
                 yield f"text of {item['id']}", said["text"], made, False
         if item["status"] not in ("yours", "stated"):
-            lacks = {*item["needs"]} - texts.keys()
-            word = "gap" if lacks else "partly" if item["note"] else "filled"
+            word = "gap" if {*item["needs"]} - {*texts} else "partly" if item["note"] else "filled"
             yield f"status of {item['id']}", item["status"], word, item["status"] == word
     hang = {(name, row + 1) for name, run in runs.items() for row, at in run["checks"]
             if len({*map(state, at)}) > 1}  # fmt: skip

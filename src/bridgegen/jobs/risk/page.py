@@ -97,6 +97,7 @@ def unsure(risk: Risk) -> Iterator[str]:
         yield data_sentence(risk.data)
     else:
         yield "Few data: the exposure's numbers are taken as they are."
+    yield risk.exposure.left_out
     yield f"Where the exposure comes from: {risk.exposure.source}"
     yield (
         "The simulation: drivers, participants, sensors and friction are those of the embedded "

@@ -56,6 +56,7 @@ def lines(risk: Risk) -> Iterator[str | Table]:
         yield f"{'check':<12}{value} ({width}) in {risk.check.evaluations:,} by mc"
     if risk.data is not None:
         yield f"{'data':<12}{data_sentence(risk.data)}"
+    yield f"{'parameters':<12}{risk.exposure.left_out}"
     if risk.elsewhere is not None:
         yield f"{'elsewhere':<12}{elsewhere_sentence(risk.elsewhere)}"
     yield f"{'page':<12}{risk.folder / PAGE}"
