@@ -38,7 +38,9 @@ def main() -> None:
             same = "" if write else "same" if found[key] == known.get(key) else "DIFFERS"
             print(f"{key}: {found[key]} {same}", flush=True)
     if write:
-        text = json.dumps({"functions": conformance.function_digests(), "rows": found}, indent=1)
+        verdicts = conformance.verdict_digests()
+        all_of_them = {"functions": conformance.function_digests(), "rows": found}
+        text = json.dumps(all_of_them | {"verdicts": verdicts}, indent=1)
         path = Path(conformance.__file__).with_name("conformance.json")
         path.write_text(text + "\n", encoding="utf-8")
 

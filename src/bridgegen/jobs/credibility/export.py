@@ -20,8 +20,16 @@ from bridgegen.jobs.credibility.form import FILE as FORM_FILE
 from bridgegen.jobs.credibility.form import read_form, write_form
 from bridgegen.jobs.credibility.items import ASKED, CHAPTERS, SOURCES, Asked
 from bridgegen.jobs.credibility.model import FILE, Dossier, Gap, Item
-from bridgegen.jobs.credibility.options import CredibilityOptions
+from bridgegen.jobs.credibility.options import JOB, CredibilityOptions
 from bridgegen.jobs.credibility.page import GENERATOR, PAGE, page, worst
+from bridgegen.jobs.credibility.validation import FILE as PROTOCOL
+from bridgegen.jobs.credibility.validation import (
+    Protocol,
+    Validated,
+    figures_of,
+    judged,
+    validate,
+)
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.safety_case.context import assumptions
 from bridgegen.jobs.safety_case.facts import Facts, Files, read_facts, run_facts
@@ -107,7 +115,9 @@ def _lacks(facts: Facts) -> Iterator[Gap]:
         )
 
 
-def build(found: Read, answers: Mapping[str, str], out: Path) -> Dossier:
+def build(
+    found: Read, answers: Mapping[str, str], out: Path, protocol: Protocol | None = None
+) -> Dossier:
     """Return the dossier of runs.
 
     Args:
@@ -264,10 +274,12 @@ class Exported:
     Attributes:
         dossier: its content.
         folder: that holds its files.
+        protocol: of the validation suite, if it was run.
     """
 
     dossier: Dossier
     folder: Path
+    protocol: Protocol | None = None
 
     @property
     def page(self) -> Path:
@@ -288,7 +300,8 @@ class Exported:
         """Return figures and items as JSON's types."""
         return {
             "page": str(self.page),
-            "figures": self.dossier.figures,
+            "figures": self.dossier.figures
+            | (figures_of(self.protocol) if self.protocol else {}),
             "items": [
                 {"item": item.id, "status": item.status, "claim": item.claim.text}
                 for item in self.dossier.items
@@ -311,7 +324,10 @@ class Exported:
     def judged(self) -> list[Judged]:
         """Return whether all runs could be read, and the figures."""
         dossier = self.dossier
+        figures = dossier.figures | figures_of(self.protocol)
+        suite = [judged(self.protocol, str(self.page), figures)] if self.protocol else []
         return [
+            *suite,
             Judged(
                 suite=str(self.page),
                 group="bridgegen.credibility",
@@ -319,20 +335,20 @@ class Exported:
                 holds=not dossier.unread,
                 details="; ".join(gap.why for gap in dossier.gaps[: dossier.unread])
                 or f"{len(dossier.runs)} runs",
-                figures=dossier.figures,
+                figures=figures,
                 facts={},
-            )
+            ),
         ]
 
 
 @called_with(CredibilityOptions)
-def export_credibility(given: CredibilityOptions) -> Exported:
+def export_credibility(given: CredibilityOptions) -> Exported | Validated:
     """Write the credibility dossier of runs, or of all runs of projects.
 
     A run that cannot be read is a gap of the dossier. ``yours.yaml`` is kept as it is.
 
     Returns:
-        The dossier, and its files.
+        The dossier, and its files; without runs the protocol of the validation suite.
 
     Raises:
         InputError: no folder; or a folder of a run is to be that of the dossier.
@@ -340,7 +356,7 @@ def export_credibility(given: CredibilityOptions) -> Exported:
         StorageError: a folder is missing or has no run; or the files cannot be written.
     """
     named: list[Path] = list(given.runs)  # type: ignore[arg-type]  # its form makes them so
-    if not named:
+    if not named and not given.validate:
         raise InputError("a dossier is of one run at least, got none")
     folders = _runs_of(named)
     alone = len(folders) == 1 and folders[0] == named[0]
@@ -349,11 +365,18 @@ def export_credibility(given: CredibilityOptions) -> Exported:
         raise InputError(f"{out}: is the folder of a run; choose another --out")
     refuse_other(out / PAGE, GENERATOR, "dossier")
     answers = read_form(out)
-    dossier = build(read(folders), answers, out)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StorageError(f"{out}: cannot be written: {error.strerror}") from None
+    protocol = None
+    if given.validate:
+        protocol = validate(given.callbacks)
+        text = protocol.model_dump_json(indent=1).encode("utf-8", "replace") + b"\n"
+        write_whole(out / PROTOCOL, [text])
+        if not named:
+            return Validated(protocol, out / PROTOCOL, [*JOB.figures])
+    dossier = build(read(folders), answers, out, protocol)
     write_form(out)
     data = dossier.model_dump_json(indent=1).encode("utf-8", "replace") + b"\n"
     write_whole(out / FILE, [data])
@@ -363,7 +386,7 @@ def export_credibility(given: CredibilityOptions) -> Exported:
     write_whole(out / GAPS, ["".join(lines).encode("utf-8", "replace")])
     script = files("bridgegen.jobs.credibility").joinpath(SCRIPT).read_bytes()
     write_whole(out / SCRIPT, [script])
-    return Exported(dossier, out)
+    return Exported(dossier, out, protocol)
 
 
 def _runs_of(named: Sequence[Path]) -> list[Path]:
