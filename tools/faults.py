@@ -1,14 +1,34 @@
 """Inject faults into kernels, one at a time: does ``bridgegen credibility --validate`` see them?
 
-    python tools/faults.py                 # writes tools/faults.json; about an hour on two cores
-    python tools/faults.py --only pet-off  # some of them, printed only
+    python tools/faults.py --write            # all of them, into the package's release.json
+    python tools/faults.py --only pet-off     # some of them, printed only
+    python tools/faults.py --random 30        # instead: changes of operators, drawn by chance
 
 Each fault is a text of a file that another one replaces, in a copy of the package with a cache of
-compiled code of its own. A text that is not there exactly once is refused, so that no fault rots.
-The list was written, and committed, before the suite was: none was chosen because it is found.
+compiled code of its own: that of the unchanged package, in which code is kept by the content of
+its source and of all that this imports, so that what a fault reaches is compiled anew and nothing
+else. A text that is not there exactly once is refused, so that no fault rots. The list was written,
+and committed, before the suite was: none was chosen because it is found. Whoever wrote the suite
+knew the list, though; faults that are drawn by chance nobody knew.
 """
 
-from typing import NamedTuple
+import argparse
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+PACKAGE = Path(__file__).parents[1] / "src" / "bridgegen"
+RELEASE = PACKAGE / "jobs" / "credibility" / "release.json"
+LONGEST = 1500  # s; a suite that takes longer hangs
 
 
 class Fault(NamedTuple):
@@ -128,3 +148,139 @@ FAULTS = (
           "dt + 1e-9 >= CAREFUL_REACTION:", "dt + 1e-9 >= 2.0 * CAREFUL_REACTION:",
           "attentive traffic: twice the reaction time"),
 )  # fmt: skip
+
+
+OPERATORS = (
+    (" + ", " - "), (" - ", " + "), (" * ", " / "), (" < ", " <= "), (" >= ", " > "), (" <= ", " < "),
+    (" > ", " >= "), ("max(", "min("), ("min(", "max("), (" and ", " or "), (" == ", " != "),
+    (" 0.5 ", " 1.0 "), ("not ", ""),
+)  # fmt: skip
+"""What a fault that is drawn by chance changes, as mutation testing does."""
+
+
+def drawn(n: int, seed: int) -> list[Fault]:
+    """Return faults by chance: an operator in a line of a kernel that verdicts rest on."""
+    paths = [
+        path
+        for room in ("assess", "simulation", "drivers")
+        for path in sorted((PACKAGE / room).rglob("_*_kernels.py"))
+    ]
+    places = []
+    for path in paths:
+        text = re.sub(
+            r'""".*?"""', lambda m: re.sub(r"[^\n]", "#", m[0]), path.read_text(), flags=re.S
+        )
+        lines = path.read_text().splitlines(keepends=True)
+        for line, code in zip(lines, text.splitlines(keepends=True), strict=True):
+            code = code.partition("#")[0]
+            if lines.count(line) == 1 and not re.match(
+                r"(@|def |from |import |[A-Z_, ]+ = )", line
+            ):
+                places += [(path, line, *pair) for pair in OPERATORS if code.count(pair[0]) == 1]
+    found = random.Random(seed).sample(places, n)
+    return [
+        Fault(f"random-{k}", path.relative_to(PACKAGE).as_posix(), line, line.replace(old, new),
+              f"{path.stem}: `{line.strip()}`: `{old.strip()}` becomes `{new.strip()}`")
+        for k, (path, line, old, new) in enumerate(found, start=1)
+    ]  # fmt: skip
+
+
+def inject(fault: Fault, package: Path) -> None:
+    """Change a copy of the package; refuse a text that is not there exactly once."""
+    path = package / fault.file
+    text = path.read_text("utf-8")
+    if text.count(fault.text) != 1:
+        raise SystemExit(f"{fault.name}: {text.count(fault.text)} times in {fault.file}, must be 1")
+    path.write_text(text.replace(fault.text, fault.replaced), "utf-8")
+
+
+SUITE = """
+import json, sys
+import bridgegen
+from bridgegen.jobs.credibility.validation import every_case, result_of
+print(bridgegen.__file__)
+for case in every_case():
+    found = result_of(case)
+    if not found["passed"]:
+        print(json.dumps([case.id, case.kind]))
+        sys.exit(3)
+"""
+"""The cases of ``credibility --validate`` in their order, known answers and laws first, up to the
+first that fails: one turns the dossier red, and whether later ones do, too, costs minutes."""
+
+
+def first_failure(place: Path) -> tuple[str, str]:
+    """Return the first case that fails in the copy in a folder, and its kind; "" if none does."""
+    env = os.environ | {"PYTHONPATH": str(place), "NUMBA_CACHE_DIR": str(place / "cache")}
+    given: dict[str, Any] = {"cwd": place, "env": env, "capture_output": True, "text": True}
+    try:
+        done = subprocess.run([sys.executable, "-c", SUITE], timeout=LONGEST, **given)
+    except subprocess.TimeoutExpired:
+        return "hangs", "end"
+    file, *more = done.stdout.splitlines() or [""]
+    if not file.startswith(str(place)):
+        raise SystemExit(f"another package was run than the copy: {file!r} {done.stderr[-2000:]}")
+    if done.returncode == 3:
+        case, kind = json.loads(more[-1])
+        return case, kind
+    return ("", "") if done.returncode == 0 else (f"ends with {done.returncode}", "end")
+
+
+def copied(base: Path) -> Path:
+    """Return a folder with a copy of the package, and of a cache if there is one."""
+    place = Path(tempfile.mkdtemp(prefix="bridgegen-fault-"))
+    shutil.copytree(PACKAGE, place / "bridgegen", ignore=shutil.ignore_patterns("__pycache__"))
+    if base != place and (base / "cache").is_dir():
+        shutil.copytree(base / "cache", place / "cache")
+    return place
+
+
+def see(fault: Fault, base: Path) -> dict[str, str]:
+    """Inject a fault; return which case sees it first, and its kind."""
+    began, place = time.monotonic(), copied(base)
+    try:
+        inject(fault, place / "bridgegen")
+        case, kind = first_failure(place)
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+    took = f"{time.monotonic() - began:>5.0f} s"
+    print(f"{fault.name:<18}{case or 'MISSED':<10}{kind:<8}{took}  {fault.what}", flush=True)
+    return {"name": fault.name, "what": fault.what, "case": case, "kind": kind}
+
+
+def main() -> None:
+    """Print, or write, which faults are seen, and by which kind of case."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="*", help="names of faults")
+    parser.add_argument("--random", type=int, default=0, help="draw so many faults by chance")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--base", type=Path, help="a folder whose compiled code is kept and used")
+    parser.add_argument("--write", action="store_true", help="into the package's release.json")
+    options = parser.parse_args()
+    faults = drawn(options.random, options.seed) if options.random else list(FAULTS)
+    faults = [fault for fault in faults if not options.only or fault.name in options.only]
+    for fault in faults:
+        assert (PACKAGE / fault.file).read_text("utf-8").count(fault.text) == 1, fault.name
+    base = copied(options.base or Path("none"))
+    try:
+        began = time.monotonic()
+        if any(found := first_failure(base)):
+            raise SystemExit(f"the suite does not pass without a fault: {found}")
+        print(f"without a fault it passes, in {time.monotonic() - began:.0f} s", flush=True)
+        if options.base:
+            shutil.copytree(base / "cache", options.base / "cache", dirs_exist_ok=True)
+        with ThreadPoolExecutor(2) as pool:
+            rows = list(pool.map(lambda fault: see(fault, base), faults))
+    finally:
+        shutil.rmtree(base, ignore_errors=True)
+    seen = [row["kind"] for row in rows if row["kind"]]
+    known = sum(kind != "bits" for kind in seen)
+    print(f"{len(seen)} of {len(rows)} seen, {known} of them without the published bits")
+    if options.write:
+        release = json.loads(RELEASE.read_text("utf-8")) if RELEASE.is_file() else {}
+        release["random_faults" if options.random else "faults"] = rows
+        RELEASE.write_text(json.dumps(release, indent=1, ensure_ascii=False) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -39,9 +39,7 @@ def function_digests() -> dict[str, str]:
     return {name: _digest([getattr(elementary, name)(x, y)]) for name in FUNCTIONS}
 
 
-def rows_digest(
-    scenario: str, driver: str, rows: int = ROWS, *, verdicts: bool = False
-) -> str:
+def rows_digest(scenario: str, driver: str, rows: int = ROWS, *, verdicts: bool = False) -> str:
     """Return the digest of the motion and the metrics of random rows of a scenario.
 
     Args:

@@ -1,10 +1,12 @@
 """The dossier of runs: read, filled, written with its page and the script that recomputes it."""
 
+import json
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from importlib.resources import files
+from math import nan
 from pathlib import Path
 
 from bridgegen.base._elementary_kernels import FUNCTIONS
@@ -22,14 +24,9 @@ from bridgegen.jobs.credibility.items import ASKED, CHAPTERS, SOURCES, Asked
 from bridgegen.jobs.credibility.model import FILE, Dossier, Gap, Item
 from bridgegen.jobs.credibility.options import JOB, CredibilityOptions
 from bridgegen.jobs.credibility.page import GENERATOR, PAGE, page, worst
+from bridgegen.jobs.credibility.release import SBOM, known_faults, release, sbom
 from bridgegen.jobs.credibility.validation import FILE as PROTOCOL
-from bridgegen.jobs.credibility.validation import (
-    Protocol,
-    Validated,
-    figures_of,
-    judged,
-    validate,
-)
+from bridgegen.jobs.credibility.validation import FIGURES, Protocol, Validated, validate
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.safety_case.context import assumptions
 from bridgegen.jobs.safety_case.facts import Facts, Files, read_facts, run_facts
@@ -139,9 +136,10 @@ def build(
     more.add("bits_compared", len(FUNCTIONS) + rows, again="bridgegen doctor")
     more.add("bits_different", len(different), again="bridgegen doctor")
     more.add("installed", len(distributions), again="python -m pip list")
+    _of_package(more, runs, protocol)
     more.add("files", len(evidence), source=FILE)
     numbers |= {number.id: number for number in more.all}
-    details = _added(runs, numbers, different)
+    details = _added(runs, numbers, different, protocol)
     notes = _notes(found, numbers, rows=rows)
     items = tuple(
         _filled(
@@ -182,13 +180,33 @@ def build(
     )
 
 
+def _of_package(numbers: Numbers, runs: Mapping[str, Facts], protocol: Protocol | None) -> None:
+    """Add what the release and the validation suite state."""
+    for name, key in (("mutants", "faults"), ("random", "random_faults")):
+        if rows := release().get(key):
+            for part, count in (
+                ("", len(rows)),
+                ("_seen", sum(bool(row["kind"]) for row in rows)),
+                ("_known", sum(row["kind"] in ("answer", "law") for row in rows)),
+            ):
+                numbers.add(name + part, count, again="python tools/faults.py, in the source")
+    faults = known_faults(facts.run.version for facts in runs.values())
+    numbers.add("known_faults", len(faults), again="bridgegen credibility RUN")
+    if protocol:
+        for name, of in (("", "cases"), ("_wrong", "wrong"), ("_bits", "other_bits")):
+            numbers.add(f"cases{name}", protocol.figures[of], source=PROTOCOL)
+
+
 def _plain(text: str) -> str:
     """Return a text of a run for a template: its braces name no number."""
     return text.translate({ord("{"): "(", ord("}"): ")"})
 
 
 def _added(
-    runs: Mapping[str, Facts], numbers: Mapping[str, Number], different: Sequence[str]
+    runs: Mapping[str, Facts],
+    numbers: Mapping[str, Number],
+    different: Sequence[str],
+    protocol: Protocol | None,
 ) -> Details:
     """Return what runs and package add to items, by their ids: templates of sentences."""
     ran = [number for name, number in numbers.items() if name.startswith("all.ran:")]
@@ -207,6 +225,16 @@ def _added(
             for name, facts in runs.items()
         ],
         "5.1": [f"Differs: {name}." for name in different],
+        "5.3": [_plain(text) for text in release().get("coverage", ())],
+        "5.4": [
+            _plain(f"{one['id']} fails, known by {one['kind']}: {one['what']}")
+            for one in (protocol.results if protocol else ())
+            if not one["passed"]
+        ],
+        "5.5": [
+            _plain(f"{one['id']}, {one['effect']}: {one['what']} In {one['only']}.")
+            for one in known_faults(facts.run.version for facts in runs.values())
+        ],
         "8.1": simulators,
         "9.3": simulators,
         "9.1": [
@@ -244,6 +272,7 @@ def _filled(asked: Asked, numbers: dict[str, Number], answers: Mapping[str, str]
             **common,
             claim=Statement(text=answer or asked.claim),
             how=asked.claim if answer else "",
+            details=[Statement(text=text) for text in asked.details],
             again="" if answer else f"write it in {FORM_FILE}, under {asked.form}",
             status="stated" if answer else "yours",
         )
@@ -300,8 +329,7 @@ class Exported:
         """Return figures and items as JSON's types."""
         return {
             "page": str(self.page),
-            "figures": self.dossier.figures
-            | (figures_of(self.protocol) if self.protocol else {}),
+            "figures": self.dossier.figures | (self.protocol.figures if self.protocol else {}),
             "items": [
                 {"item": item.id, "status": item.status, "claim": item.claim.text}
                 for item in self.dossier.items
@@ -324,10 +352,10 @@ class Exported:
     def judged(self) -> list[Judged]:
         """Return whether all runs could be read, and the figures."""
         dossier = self.dossier
-        figures = dossier.figures | figures_of(self.protocol)
-        suite = [judged(self.protocol, str(self.page), figures)] if self.protocol else []
+        suite = self.protocol.figures if self.protocol else dict.fromkeys(FIGURES, nan)
+        figures = dossier.figures | suite
         return [
-            *suite,
+            *([self.protocol.judged(str(self.page), figures)] if self.protocol else ()),
             Judged(
                 suite=str(self.page),
                 group="bridgegen.credibility",
@@ -372,8 +400,7 @@ def export_credibility(given: CredibilityOptions) -> Exported | Validated:
     protocol = None
     if given.validate:
         protocol = validate(given.callbacks)
-        text = protocol.model_dump_json(indent=1).encode("utf-8", "replace") + b"\n"
-        write_whole(out / PROTOCOL, [text])
+        write_whole(out / PROTOCOL, [json.dumps(protocol.facts, indent=1).encode() + b"\n"])
         if not named:
             return Validated(protocol, out / PROTOCOL, [*JOB.figures])
     dossier = build(read(folders), answers, out, protocol)
@@ -383,6 +410,7 @@ def export_credibility(given: CredibilityOptions) -> Exported | Validated:
     write_whole(out / PAGE, [page(dossier, data)])
     lines = [f"{gap.place}: {gap.why}" + f" [{gap.command}]" * bool(gap.command) + "\n"
              for gap in dossier.gaps]  # fmt: skip
+    write_whole(out / SBOM, [sbom()])
     write_whole(out / GAPS, ["".join(lines).encode("utf-8", "replace")])
     script = files("bridgegen.jobs.credibility").joinpath(SCRIPT).read_bytes()
     write_whole(out / SCRIPT, [script])
