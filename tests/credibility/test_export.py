@@ -34,7 +34,8 @@ def test_a_stranger_finds_every_figure(dossier, recomputed):
     assert recomputed(dossier.folder) == (0, [], "")
     files = {path.name for path in dossier.folder.iterdir()}
     assert files == {
-        "credibility.html", "credibility.json", "gaps.txt", "recompute.py", "yours.yaml",
+        "credibility.html", "credibility.json", "gaps.txt", "recompute.py", "sbom.cdx.json",
+        "yours.yaml",
     }  # fmt: skip
 
 

@@ -25,8 +25,8 @@ from bridgegen.jobs.credibility.model import FILE, Dossier, Gap, Item
 from bridgegen.jobs.credibility.options import JOB, CredibilityOptions
 from bridgegen.jobs.credibility.page import GENERATOR, PAGE, page, worst
 from bridgegen.jobs.credibility.release import SBOM, known_faults, release, sbom
-from bridgegen.jobs.credibility.validation import FILE as PROTOCOL
 from bridgegen.jobs.credibility.validation import FIGURES, Protocol, Validated, validate
+from bridgegen.jobs.credibility.validation import FILE as PROTOCOL
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.safety_case.context import assumptions
 from bridgegen.jobs.safety_case.facts import Facts, Files, read_facts, run_facts
@@ -121,6 +121,7 @@ def build(
         found: the runs.
         answers: what people stated, by key of the form.
         out: the folder of the dossier, which files are named from.
+        protocol: of the validation suite, if it was run.
     """
     runs = found.runs
     evidence: list[Evidence] = []

@@ -213,7 +213,8 @@ ASKED: tuple[Asked, ...] = (
           " have a wrong answer, {all.cases_bits} other bits than the published ones.",
           how="Closed forms, published numbers, laws, and published bits: validation.json.",
           again="bridgegen credibility --validate", needs=("cases",), sources=("26262", *COMMON),
-          gap="The suite was not run with this dossier", fill="bridgegen credibility RUN --validate"),
+          gap="The suite was not run with this dossier",
+          fill="bridgegen credibility RUN --validate"),
     Asked("5.5", "Known faults", "{all.known_faults} faults that were found later concern the "
           "versions of these runs, or may.", how="The list that this release keeps.",
           again="bridgegen credibility RUN", sources=("26262", *COMMON)),

@@ -1,6 +1,6 @@
 """Cases with known answers: closed forms, published numbers, and laws that hold of any scene.
 
-Those of ``known-answers.yaml`` are data; the others need a simulation, or many bodies, and are here.
+Those of ``known-answers.yaml`` are data; the others, which need more than a scene, are here.
 Answers come from formulas in plain arithmetic, or are published; no kernel computes its own.
 """
 
@@ -353,15 +353,16 @@ def _judged(scene: Rollout) -> Float:
     return np.nan_to_num(np.column_stack([evaluate(scene, names), *pairs]), posinf=1e6)
 
 
-@_case("L1", "invariance", "Metrics and verdicts are the same where a scene is moved and turned, or "
-       "mirrored, others change places, or a row is judged alone.", "law")  # fmt: skip
+@_case("L1", "invariance", "Metrics and verdicts are the same where a scene is moved and turned, "
+       "or mirrored, others change places, or a row is judged alone.", "law")  # fmt: skip
 def _scenes() -> Iterator[Check]:
     rng, shape, t = np.random.default_rng(7), (8, 4, 1), DT * np.arange(50)
     v = np.maximum(rng.uniform(0.0, 14.0, shape) + rng.uniform(-6.0, 3.0, shape) * t, 0.0)
     h = rng.uniform(-3.0, 3.0, shape) + rng.uniform(-0.5, 0.5, shape) * t
     x, y = (rng.uniform(-15.0, 15.0, shape) + np.cumsum(DT * v * f(h), 2) for f in (np.cos, np.sin))
     scene = Rollout(
-        time_step=DT, names=("ego", "a", "b", "c"), x=x, y=y, h=h, v=v, a=np.gradient(v, DT, axis=2),
+        time_step=DT, names=("ego", "a", "b", "c"), x=x, y=y, h=h, v=v,
+        a=np.gradient(v, DT, axis=2),
         box=np.column_stack([rng.uniform(3.0, 9.0, 4), rng.uniform(1.0, 3.0, 4), np.zeros(4)]),
         offset=np.zeros_like(x), n_steps=np.full(8, 50), status=np.zeros(8, np.int8),
         kinds=np.array([kinds.CAR, kinds.CAR, kinds.TRUCK, kinds.BICYCLE]),
@@ -384,11 +385,12 @@ def _scenes() -> Iterator[Check]:
         yield Check(f"{name}: largest difference", 0.0, off, tolerance)
 
 
-@_case("L2", "invariance", "A row's motion depends on neither batch nor repetition; the ego moves by "
-       "its speed, within what its tyres give.", "law")  # fmt: skip
+@_case("L2", "invariance", "A row's motion depends on neither batch nor repetition; the ego moves "
+       "by its speed, within what its tyres give.", "law")  # fmt: skip
 def _motions() -> Iterator[Check]:
     for name, driver in (
-        ("crossroads-s4", "route-follower"), ("stopped-after-curve", "careful"), ("cut-in", "un-r157"),
+        ("crossroads-s4", "route-follower"), ("stopped-after-curve", "careful"),
+        ("cut-in", "un-r157"),
     ):  # fmt: skip
         pipeline = _driven(name, driver)
         X = pipeline.space.decode(np.random.default_rng(1).random((60, pipeline.space.n_var)))
