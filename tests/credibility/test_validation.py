@@ -195,7 +195,7 @@ def test_hostile_metadata_is_text(monkeypatch):
     )  # fmt: skip
     monkeypatch.setattr(module, "distributions", lambda: [item])
     (part,) = json.loads(module.sbom())["components"]
-    assert part["purl"] == "pkg:pypi/a%20b/../%3Cscript%3E@1%0A"
+    assert part["purl"] == "pkg:pypi/a%20b%2F-%2F%3Cscript%3E@1%0A"
     assert len(part["licenses"][0]["license"]["name"]) == 200
 
 

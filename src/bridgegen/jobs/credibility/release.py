@@ -14,7 +14,7 @@ from urllib.parse import quote
 import yaml
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
-from packaging.version import InvalidVersion
+from packaging.version import InvalidVersion, Version
 
 SBOM = "sbom.cdx.json"
 
@@ -27,7 +27,7 @@ def known_faults(versions: Iterable[str]) -> list[dict[str, str]]:
 
     def concerns(fault: dict[str, str], number: str) -> bool:
         try:
-            return SpecifierSet(fault["versions"]).contains(number, prereleases=True)
+            return SpecifierSet(fault["versions"]).contains(Version(number), prereleases=True)
         except InvalidVersion:
             return True
 
@@ -69,7 +69,7 @@ def sbom() -> bytes:
 def _component(item: Distribution) -> dict[str, Any]:
     about = item.metadata
     name, number = str(about["Name"] or "unnamed")[:200], str(item.version or "0")[:100]
-    purl = f"pkg:pypi/{quote(canonicalize_name(name))}@{quote(number)}"
+    purl = "pkg:pypi/" + "@".join(quote(one, safe="") for one in (canonicalize_name(name), number))
     found: dict[str, Any] = {
         "type": "library", "bom-ref": purl, "name": name, "version": number, "purl": purl
     }  # fmt: skip
