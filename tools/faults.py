@@ -152,7 +152,8 @@ FAULTS = (
 
 OPERATORS = (
     (" + ", " - "), (" - ", " + "), (" * ", " / "), (" < ", " <= "), (" >= ", " > "),
-    (" <= ", " < "), (" > ", " >= "), ("max(", "min("), ("min(", "max("), (" and ", " or "), (" == ", " != "),
+    (" <= ", " < "), (" > ", " >= "), ("max(", "min("), ("min(", "max("),
+    (" and ", " or "), (" == ", " != "),
     (" 0.5 ", " 1.0 "), ("not ", ""),
 )  # fmt: skip
 """What a fault that is drawn by chance changes, as mutation testing does."""

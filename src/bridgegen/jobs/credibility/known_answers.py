@@ -159,9 +159,9 @@ def _body(
 
 def _scene(*bodies: Mapping[str, Float], kinds: Any = (), **more: Any) -> Rollout:
     e, t = len(bodies), len(bodies[0]["x"])
-    states = {name: np.array([[one[name] for one in bodies]]) for name in bodies[0]}
+    more |= {name: np.array([[one[name] for one in bodies]]) for name in bodies[0]}
     return Rollout(
-        time_step=DT, names=("ego", "other")[:e], box=np.array(BOXES[:e]), **states,
+        time_step=DT, names=("ego", "other")[:e], box=np.array(BOXES[:e]),
         offset=np.zeros((1, e, t)), n_steps=np.array([t]), status=np.zeros(1, np.int8),
         kinds=np.array(kinds or [0] * e), **more,
     )  # fmt: skip

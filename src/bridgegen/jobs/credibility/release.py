@@ -67,7 +67,7 @@ def sbom() -> bytes:
 
 
 def _component(item: Distribution) -> dict[str, Any]:
-    about = item.metadata
+    about: Any = item.metadata
     name, number = str(about["Name"] or "unnamed")[:200], str(item.version or "0")[:100]
     purl = "pkg:pypi/" + "@".join(quote(one, safe="") for one in (canonicalize_name(name), number))
     found: dict[str, Any] = {

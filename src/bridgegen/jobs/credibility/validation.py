@@ -52,8 +52,8 @@ class Protocol:
     @property
     def figures(self) -> dict[str, float]:
         """Those of `FIGURES`."""
-        failed = {name: len(self.failed(*kinds)) for name, kinds in FIGURES.items()}
-        return failed | {"cases": len(self.results)}
+        failed = {name: float(len(self.failed(*kinds))) for name, kinds in FIGURES.items()}
+        return failed | {"cases": float(len(self.results))}
 
     @property
     def verdict(self) -> str:
