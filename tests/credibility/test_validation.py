@@ -98,7 +98,9 @@ def test_a_wrong_answer_is_the_first_thing_that_the_dossier_says(
 ):
     suite_of("passes", "is wrong", "has other bits")
     found = bg.export_credibility([made["clean"]], validate=True, out=tmp_path)
-    assert found.shown()[0].startswith("The validation suite finds wrong answers: 1 case.")
+    assert found.shown()[0].startswith("1 case of the validation suite (5.4) has a wrong answer: ")
+    (item,) = (item for item in found.dossier.items if item.id == "5.4")
+    assert item.status == "partly"
     text = found.page.read_text("utf-8")
     assert "FAILS" in text
     assert "is wrong fails, known by answer" in text

@@ -142,6 +142,8 @@ def build(
     numbers |= {number.id: number for number in more.all}
     details = _added(runs, numbers, different, protocol)
     notes = _notes(found, numbers, rows=rows)
+    if protocol and protocol.failed(*FIGURES["cases"]):
+        notes["5.4"] = "cases fail, which are named here"
     items = tuple(
         _filled(
             replace(

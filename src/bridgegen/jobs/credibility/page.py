@@ -46,7 +46,9 @@ def worst(dossier: Dossier) -> str:
 def _worst(dossier: Dossier, suite: Mapping[str, float]) -> Iterator[str]:
     figures, different = dossier.figures, suite["all.bits_different"]
     if wrong := suite.get("all.cases_wrong"):
-        yield f"The validation suite finds wrong answers: {counted(int(wrong), 'case')}."
+        has = "has a wrong answer" if wrong == 1 else "have wrong answers"
+        yield f"{counted(int(wrong), 'case')} of the validation suite (5.4) {has}: rest nothing " \
+              "on this installation."  # fmt: skip
     if different or suite.get("all.cases_bits"):
         yield "This machine does not give the published bits."
     if dossier.unread:
