@@ -46,7 +46,7 @@ def rows_digest(scenario: str, driver: str, rows: int = ROWS, *, verdicts: bool 
         scenario: of the catalogue, or a path.
         driver: the ego's.
         rows: how many are drawn; those that the scenario's rules refuse do not count.
-        verdicts: include kind, type, responsibility and severity of all conflicts.
+        verdicts: include all that is said of conflicts, but harm.
 
     Raises:
         InputError: no such scenario or driver, or the driver does not drive there.
@@ -64,7 +64,8 @@ def rows_digest(scenario: str, driver: str, rows: int = ROWS, *, verdicts: bool 
             yield from (rollout.n_steps, rollout.status, pipeline.measure(rollout))
             if verdicts:
                 found = analyse(rollout)
-                yield from (found.kind, found.type, found.responsible, found.at_fault)
+                yield from (found.kind, found.type, found.responsible, found.rule)
+                yield from (found.instant, found.decided, found.preventable, found.at_fault)
                 yield found.severity  # not harm: it takes a logarithm of the system's
 
     return _digest(arrays())
