@@ -206,8 +206,8 @@ ASKED: tuple[Asked, ...] = (
           "those who wrote it knew the list.", again="python tools/faults.py, in the source",
           sources=("26262", *COMMON), gap="This package has no record of injected faults",
           details=("Of {all.random} operators of kernels that were changed by chance, which nobody "
-                   "knew before, it sees {all.random_seen}: {all.random_known} by a known answer "
-                   "or a law. What it misses may change no result.",),
+                   "knew before, it saw {all.random_seen}: {all.random_known} by a known answer or "
+                   "a law. The chosen faults are no sample: do not read their share as a rate.",),
           note="of this release, not of this machine"),
     Asked("5.4", "Validation suite", "{all.cases} cases were run on this machine: {all.cases_wrong}"
           " have a wrong answer, {all.cases_bits} other bits than the published ones.",
