@@ -35,7 +35,7 @@ def test_a_stranger_finds_every_figure(dossier, recomputed):
     files = {path.name for path in dossier.folder.iterdir()}
     assert files == {
         "credibility.html", "credibility.json", "gaps.txt", "measured.csv", "recompute.py",
-        "recompute_real.py", "validated.json", "yours.yaml",
+        "recompute_real.py", "sbom.cdx.json", "validated.json", "yours.yaml",
     }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """A dossier as one offline page without scripts: verdict, chapters, gaps, runs and files."""
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from bridgegen.jobs.credibility.measured import FEWEST
 from bridgegen.jobs.credibility.model import FILE, Dossier, Item
@@ -10,6 +10,9 @@ from bridgegen.pages.templates import Banner, Cell, counted
 
 PAGE = "credibility.html"
 GENERATOR = "bridgegen credibility"
+
+SUITE = ("all.bits_different", "all.cases_wrong", "all.cases_bits")
+"""Numbers that must be 0, or nothing else counts."""
 
 MOST_FLIPS = 30
 """Largest number of evaluations that the page names as depending on the time step."""
@@ -34,17 +37,21 @@ _MEANING = {
 def worst(dossier: Dossier) -> str:
     """Return the dossier in two sentences, the worst thing first."""
     figures = dossier.figures
-    different = next(one for one in dossier.numbers if one.id == "all.bits_different")
+    value = {one.id: float(one.value) for one in dossier.numbers if one.id in SUITE}
     status = (
         f"{figures['filled']:,.0f} items are filled by figures, {figures['partly']:,.0f} partly; "
         f"{figures['yours']:,.0f} are yours to fill, {figures['gap']:,.0f} are gaps."
     )
-    return f"{next(_worst(dossier, different.value))} {status}"
+    return f"{next(_worst(dossier, value))} {status}"
 
 
-def _worst(dossier: Dossier, different: float | str) -> Iterator[str]:
-    figures = dossier.figures
-    if different:
+def _worst(dossier: Dossier, suite: Mapping[str, float]) -> Iterator[str]:
+    figures, different = dossier.figures, suite["all.bits_different"]
+    if wrong := suite.get("all.cases_wrong"):
+        has = "has a wrong answer" if wrong == 1 else "have wrong answers"
+        yield f"{counted(int(wrong), 'case')} of the validation suite (5.4) {has}: rest nothing " \
+              "on this installation."  # fmt: skip
+    if different or suite.get("all.cases_bits"):
         yield "This machine does not give the published bits."
     if dossier.unread:
         yield f"{counted(dossier.unread, 'run')} of {dossier.unread + len(dossier.runs):,} could " \
@@ -77,6 +84,8 @@ def page(dossier: Dossier, data: bytes) -> bytes:
     bad = dossier.unread or figures["flips"] or figures["refused"]
     missing = figures["yours"] or figures["gap"]
     kind, word = ("open", "INCOMPLETE") if bad or missing else ("passes", "COMPLETE")
+    if any(one.value for one in dossier.numbers if one.id in SUITE):
+        kind, word = "fails", "FAILS"
     name = {run.id: f"{run.scenario} with {run.ego}" for run in dossier.runs}
     text = {number.id: number.text for number in dossier.numbers}
     return templates.page(

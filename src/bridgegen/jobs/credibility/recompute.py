@@ -19,7 +19,18 @@ from typing import Any
 
 ROUND = {"percent": ROUND_HALF_EVEN, "percent_up": ROUND_CEILING, "percent_down": ROUND_FLOOR}
 FIT = "status = 0 AND implausible IS NULL"  # has a result, and traffic that could happen
-OUTSIDE = ("bits_compared", "bits_different", "installed")  # not in the files
+OUTSIDE = (
+    "bits_compared",
+    "bits_different",
+    "installed",
+    "known_faults",
+    "mutants",
+    "mutants_seen",
+    "mutants_known",
+    "random",
+    "random_seen",
+    "random_known",
+)  # not in files
 
 
 def tail(k: int, n: int, p: float) -> float:
@@ -124,6 +135,22 @@ def errors(at: list[dict[str, Any]], of: str) -> dict[str, Any] | None:
     return found | {"q": q, "order": order}
 
 
+def suite(name: str, base: Path) -> int:
+    """Return how many cases the validation suite has, or how many of a kind fail."""
+    cases = json.loads((base / "validation.json").read_text("utf-8"))["results"]
+    of = {"cases_wrong": ("answer", "law"), "cases_bits": ("bits",)}.get(name)
+    if of is None:
+        return len(cases)
+
+    def differs(at: dict[str, Any]) -> bool:
+        pair = at["expected"], at["found"]
+        near = str not in map(type, pair) and abs(pair[0] - pair[1]) <= at["tolerance"]
+        return not (near or pair[0] == pair[1])
+
+    failed = [one for one in cases if not one["checks"] or any(map(differs, one["checks"]))]
+    return sum(one["kind"] in of for one in failed)
+
+
 def of_all(name: str, of: str, runs: list[dict[str, Any]], files: int) -> Any:
     """Return a figure of all runs by its definition."""
     checks = [at for run in runs for _, at in run["checks"]]
@@ -168,7 +195,10 @@ def check(base: Path) -> Iterator[tuple[str, Any, Any, bool | None]]:
             yield item["id"], item["text"], f"not in the files; again: {item['again']}", None
             continue
         args = name, item["of"], [*runs.values()], len(dossier["evidence"])
-        found = of_all(*args) if owner == "all" else runs[owner][name]
+        if name.startswith("cases"):
+            found = suite(name, base)
+        else:
+            found = of_all(*args) if owner == "all" else runs[owner][name]
         near = isinstance(found, float) and math.isclose(found, stated, rel_tol=1e-9, abs_tol=1e-12)
         same = (near or found == stated) and item["text"] == written(stated, form)
         yield item["id"], item["text"], written(found, form), same
