@@ -76,7 +76,9 @@ FAULTS = (
           "    return elementary.hypot(normal, slides)\n", "    return normal\n",
           "severity: friction of the surfaces ignored"),
     Fault("reaction", f"{CONFLICT}/_careful_driver_kernels.py",
-          "            elif (m - start) * dt > REACTION + 1e-9:\n", "            elif m > start:\n",
+          "            elif (m - start) * dt > REACTION + 1e-9:\n"
+          "                rises = min((m - start) * dt - REACTION, dt)\n",
+          "            elif m > start:\n                rises = dt\n",
           "careful driver of the verdict: no reaction time"),
     Fault("wet-road", f"{CONFLICT}/_careful_driver_kernels.py",
           "min(slowed + JERK * rises, braking, gives(scene, a, i, speed))",
