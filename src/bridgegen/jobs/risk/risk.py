@@ -36,7 +36,7 @@ from bridgegen.jobs.risk.outcomes import require as require_event
 from bridgegen.jobs.risk.result import Likely, Risk
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.scenario_files import write_scenario
-from bridgegen.jobs.search.scenarios import driven_by, load
+from bridgegen.jobs.search.scenarios import driven_by, load, within
 from bridgegen.pages.moving import moving_picture
 from bridgegen.pages.scenery import Scenery
 from bridgegen.results.store import Store
@@ -195,7 +195,7 @@ def estimate_risk(given: RiskOptions) -> Risk:
         raise InputError(
             f"a risk is that of a logical scenario (.yaml) with an exposure, got {given.scenario}"
         )
-    driven = cast(LogicalScenario, driven_by(logical, given.others))
+    driven = cast(LogicalScenario, within(driven_by(logical, given.others), given.odd))
     met = _exposure(driven, given.exposure)
     if met.dimensions == 0:
         raise InputError(

@@ -15,7 +15,7 @@ from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads
-from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load
+from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load, within
 from bridgegen.jobs.suite.clauses import judged
 from bridgegen.jobs.suite.entries import Entry
 from bridgegen.jobs.suite.results import EntryResult, GridResult, RowResult, finite
@@ -112,6 +112,7 @@ def pipeline_of(job: Job) -> Pipeline:
     is_file = entry.scenario.lower().endswith(".xosc")
     trigger = job.options.empty_trigger if is_file else None
     scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
+    scenario = within(scenario, job.options.odd)
     options = replace(
         job.options,
         ego=job.ego,
