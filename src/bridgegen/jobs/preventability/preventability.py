@@ -66,6 +66,7 @@ def map_preventability(given: MapOptions) -> PreventabilityMap:
         "drivers": list(drivers),
         "models": list(judges),
         **({"vehicle": vehicle} if vehicle else {}),
+        **({} if logical.odd is None else {"odd": logical.odd.odd.to_record()}),
         # A map may be resumed long after: a driver whose file has changed since would give another
         # map.
         "files of drivers": {name: digest_of(name) or None for name in names},

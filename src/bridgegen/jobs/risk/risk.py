@@ -228,6 +228,7 @@ def estimate_risk(given: RiskOptions) -> Risk:
             "check": check,
             "start": None if Z is None else hashlib.sha256(Z.tobytes()).hexdigest(),
             "events": None if fitted is None else fitted.used,
+            **({} if driven.odd is None else {"odd": driven.odd.odd.to_record()}),
         }
         there = None
         if elsewhere is not None:

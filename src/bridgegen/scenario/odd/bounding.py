@@ -201,6 +201,7 @@ class _Maker:
     def __init__(self, scenario: LogicalScenario, where: str) -> None:
         self.scenario, self.where = scenario, where
         self.checks: list[Bound] = []
+        self.declared, self.narrowed = scenario.parameters, dict[str, list[str]]()
         self.changes: list[str] = []
         self.derived = {each.name: each for each in scenario.derived}
         self.usual, self.order = scenario.usual_values(), scenario.space().order
@@ -295,7 +296,12 @@ class _Maker:
         if ends is True:
             return True
         if ends is False:
-            raise ScenarioError(f"{self.where}: it asks {said}, {name} is {span}")
+            asked = " and ".join((*self.narrowed.get(name, ()), said))
+            declared = self.declared[name]
+            span = declared.kind.span_text(
+                declared.low, declared.high, "{:.4g}".format, f" {declared.unit}"
+            )
+            raise ScenarioError(f"{self.where}: it asks {asked}, {name} is {span}")
         if ends is None:
             return False
         low, high = ends
@@ -310,6 +316,7 @@ class _Maker:
             return False
         self.scenario = found
         now = parameter.kind.span_text(low, high, "{:.4g}".format, f" {parameter.unit}")
+        self.narrowed.setdefault(name, []).append(said)
         self.changes.append(f"{said}: {name} is {now}, declared {span}")
         return True
 
@@ -320,8 +327,10 @@ class _Maker:
         if not own or any(name in self._sources(term.formula) for term in others):
             return False
         ends = self._interval(name, own)
+        if ends is False:
+            self.keep(others)
         if not isinstance(ends, tuple):
-            return ends is True
+            return ends is not None
         parameter = self.scenario.parameters[name]
         test = _joined(("or", others))
         categories = dict(test.formula.categories)

@@ -419,7 +419,9 @@ class _Modules:
             elif key in self.modules or key in self.labels:
                 # A truth value as text: the standard's examples quote some.
                 if str(value).lower() not in ("true", "false"):
-                    self.problems.at(document, here, f"the module '{key}' is true or false")
+                    self.problems.at(
+                        document, here, f"the module '{key}' is true or false, got {value!r}"
+                    )
                     continue
                 names = [key] if key in self.modules else self.labels[key]
                 self.referred |= set(names)
