@@ -161,7 +161,7 @@ def test_every_attribute_of_the_table_is_stated_of_each_template():
             assert value is None or isinstance(value, float | list)
 
 
-# -- the same verdict as openodd-py's ---------------------------------------------------------------
+# -- the same verdict as openodd-py's --
 
 _NUMERIC = {
     "rainfall_rate": ("mm/h", 0.0, 50.0, "precipitation_rate"),

@@ -13,7 +13,7 @@ from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.parameters import Axis, Bound, Parameter
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.odd.reader import Condition, Group, Odd
-from bridgegen.scenario.odd.states import LONG, States, Term, resolved, states_of, table
+from bridgegen.scenario.odd.states import LONG, Concept, States, Term, resolved, states_of, table
 
 MOST_CLAUSES = 256
 """Most clauses that the conditions of an ODD are brought to, one by one: more are one check."""
@@ -62,6 +62,36 @@ class Fit:
         for clause in self.clauses:
             kept &= _met(clause, columns, n)
         return kept
+
+    def concept(self, name: str) -> Concept:
+        """Return an attribute that the scenario states, by the name that the ODD writes."""
+        found = self.states.concept(name)
+        assert found is not None, name
+        return found
+
+    def literals(self, name: str, columns: Mapping[str, Float]) -> dict[str, Bool]:
+        """Return which literals of a category rows have, ``(N,)`` each.
+
+        Those are left out of which it cannot be said.
+
+        Args:
+            name: of a category of the ODD's taxonomy.
+            columns: ``(N,)`` per parameter and derived quantity.
+        """
+        n = len(next(iter(columns.values())))
+        found = {}
+        for literal in self.odd.taxonomy[name]:
+            gaps: dict[str, str] = {}
+            condition = Condition(name, literal, (literal,))
+            # Not as excluded: of several participants each one counts that is of the literal.
+            tree = _tree(condition, False, self.odd, self.states, gaps, [])
+            if gaps:
+                continue
+            met = np.full(n, tree is not True)
+            if not isinstance(tree, bool):
+                met = ~np.logical_and.reduce([_met(each, columns, n) for each in _clauses(tree)])
+            found[literal] = met
+        return found
 
     def to_lines(self) -> tuple[str, ...]:
         """Return what it does in words: the ODD, its changes, and its gaps."""

@@ -23,7 +23,11 @@ from bridgegen.scenario.participants import PARTICIPANTS
 CLOSE = 1e-9
 """Relative difference by which a number may miss a limit, for rounding alone."""
 
+STRAIGHT = 1e6
+"""Radius [m] of what is no bend, and of no other quantity that a scenario states."""
+
 LONG = 100_000
+"""Most characters of a formula that an ODD's conditions make."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +172,7 @@ class States:
                 return None
             x = float(formula.evaluate(row))
             if not concept.bands:
-                return x
+                return x if x < STRAIGHT else None
             return [k for k, v in concept.bands.items() if v is not None and v[0] < x <= v[1]][:1]
         if concept.types:
             kinds = {
@@ -297,7 +301,7 @@ class States:
             spans.append((low, high, condition.above, condition.below))
         if not spans:
             return not positive
-        pieces = [_inside(formula.source, *span) for span in spans]
+        pieces = [_inside(formula, *span) for span in spans]
         text = " or ".join(f"({piece})" for piece in pieces)
         return self._terms(text if positive else f"not ({text})", condition, positive)
 
@@ -326,14 +330,16 @@ def _is_path(name: str) -> bool:
     return re.search(r"\.(occurrence|count|confidence|probability|duration|depth)", name) is None
 
 
-def _inside(formula: str, low: float, high: float, above: bool, below: bool) -> str:
+def _inside(formula: Expression, low: float, high: float, above: bool, below: bool) -> str:
     """Return the formula of whether a quantity lies in an interval."""
     parts = []
+    # Only a constant may miss a limit by rounding: of 50 km/h, say, that the file gives in m/s.
+    close = 0.0 if formula.names else CLOSE
     if math.isfinite(low):
-        limit = low + (CLOSE if above else -CLOSE) * abs(low)
+        limit = low + (close if above else -close) * abs(low)
         parts.append(f"({formula}) {'>' if above else '>='} {limit!r}")
     if math.isfinite(high):
-        limit = high + (-CLOSE if below else CLOSE) * abs(high)
+        limit = high + (-close if below else close) * abs(high)
         parts.append(f"({formula}) {'<' if below else '<='} {limit!r}")
     return " and ".join(parts) or "1 == 1"
 
