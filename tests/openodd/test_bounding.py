@@ -14,7 +14,7 @@ from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.odd.bounding import bounded
 from bridgegen.scenario.odd.reader import read_odd
-from bridgegen.scenario.odd.states import states_of, table
+from bridgegen.scenario.odd.states import concept_of, states_of, table
 
 ODD = Path(__file__).with_name("my_odd.yaml")
 
@@ -242,7 +242,7 @@ def test_rows_are_judged_as_by_openodd_py_and_bounded_rows_are_inside(tmp_path_f
         row = {name: float(values[i]) for name, values in rows.items()}
         values = {}
         for name in (*_NUMERIC, "t_junction", "agent_type"):
-            value = states.value(states.concept(name), row)
+            value = states.value(concept_of(name), row)
             values[names[name]] = value[0] if isinstance(value, list) else value
         values[names["t_junction"]] = values[names["t_junction"]] == "true"
         return peer.evaluate(values).inside

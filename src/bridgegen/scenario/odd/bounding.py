@@ -1,6 +1,6 @@
 """Bounds a logical scenario by an operational design domain: ranges, bounds, checks, and gaps."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
@@ -13,7 +13,7 @@ from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.parameters import Axis, Bound, Parameter
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.odd.reader import Condition, Group, Odd
-from bridgegen.scenario.odd.states import LONG, Concept, States, Term, resolved, states_of, table
+from bridgegen.scenario.odd.states import LONG, States, Term, concept_of, resolved, states_of, table
 
 MOST_CLAUSES = 256
 """Most clauses that the conditions of an ODD are brought to, one by one: more are one check."""
@@ -38,18 +38,18 @@ class Fit:
     Attributes:
         odd: the ODD.
         states: what the scenario states of its attributes.
-        declared: the scenario's parameters before it was bounded.
         clauses: terms of which each row keeps one, by clause.
         changes: what the ODD changes, a line each: ranges, bounds, checks.
         gaps: conditions that cannot be judged, each with the reason; they bound nothing.
+        refused: why no row at all is inside; empty where one may be.
     """
 
     odd: Odd
     states: States = field(repr=False)
-    declared: Mapping[str, Parameter] = field(repr=False)
     clauses: tuple[tuple[Term, ...], ...] = ()
     changes: tuple[str, ...] = ()
     gaps: Mapping[str, str] = field(default_factory=dict)
+    refused: tuple[str, ...] = ()
 
     def inside(self, columns: Mapping[str, Float]) -> Bool:
         """Return which rows keep all that can be judged, ``(N,)``.
@@ -63,24 +63,21 @@ class Fit:
             kept &= _met(clause, columns, n)
         return kept
 
-    def concept(self, name: str) -> Concept:
-        """Return an attribute that the scenario states, by the name that the ODD writes."""
-        found = self.states.concept(name)
-        assert found is not None, name
-        return found
-
-    def literals(self, name: str, columns: Mapping[str, Float]) -> dict[str, Bool]:
+    def literals(
+        self, name: str, columns: Mapping[str, Float], of: Iterable[str]
+    ) -> dict[str, Bool]:
         """Return which literals of a category rows have, ``(N,)`` each.
 
         Those are left out of which it cannot be said.
 
         Args:
-            name: of a category of the ODD's taxonomy.
+            name: of a category.
             columns: ``(N,)`` per parameter and derived quantity.
+            of: the literals.
         """
         n = len(next(iter(columns.values())))
         found = {}
-        for literal in self.odd.taxonomy[name]:
+        for literal in of:
             gaps: dict[str, str] = {}
             condition = Condition(name, literal, (literal,))
             # Not as excluded: of several participants each one counts that is of the literal.
@@ -121,20 +118,34 @@ def bounded(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> Log
         ScenarioError: no row is inside; says what the ODD asks, and what the scenario has.
         FileFormatError: a condition's unit is of another dimension.
     """
-    states = states_of(scenario, on_map=on_map)
-    gaps: dict[str, str] = {}
-    refused: list[str] = []
-    tree = _tree(odd.formula, True, odd, states, gaps, refused)
+    fit = fit_of(scenario, odd, on_map=on_map)
     where = f"the ODD {odd.name} excludes every row of {scenario.name}"
-    if tree is False:
-        raise ScenarioError(f"{where}: {'; '.join(refused)}")
-    clauses = [] if tree is True else list(_clauses(tree))
+    if fit.refused:
+        raise ScenarioError(f"{where}: {'; '.join(fit.refused)}")
     maker = _Maker(scenario, where)
-    for clause in sorted(clauses, key=lambda clause: len(maker.sources(clause))):
+    for clause in sorted(fit.clauses, key=lambda clause: len(maker.sources(clause))):
         maker.keep(clause)
-    fit = Fit(odd, states, scenario.parameters, tuple(clauses), tuple(maker.changes), gaps)
+    fit = replace(fit, changes=tuple(maker.changes))
     found = replace(maker.scenario, checks=(*scenario.checks, *maker.checks), odd=fit)
     return replace(found, notes=(*scenario.notes, *maker.tried(found), *fit.to_lines()))
+
+
+def fit_of(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> Fit:
+    """Return what an ODD asks of a scenario's rows; the scenario stays as it is.
+
+    Args:
+        scenario: the scenario.
+        odd: the ODD.
+        on_map: see `bounded`.
+
+    Raises:
+        FileFormatError: a condition's unit is of another dimension.
+    """
+    states, gaps, refused = states_of(scenario, on_map=on_map), dict[str, str](), list[str]()
+    tree = _tree(odd.formula, True, odd, states, gaps, refused)
+    if tree is False:
+        return Fit(odd, states, ((),), gaps=gaps, refused=tuple(refused))
+    return Fit(odd, states, () if tree is True else tuple(_clauses(tree)), gaps=gaps)
 
 
 def _tree(
@@ -176,7 +187,7 @@ def _tree(
 
 
 def _contradiction(condition: Condition, positive: bool, states: States) -> str:
-    concept = states.concept(condition.concept)
+    concept = concept_of(condition.concept)
     asks = f"it {'asks' if positive else 'excludes'} {condition.name}"
     if concept is None:
         return asks
@@ -220,6 +231,8 @@ def _joined(tree: Any) -> Term:
 
 
 def _met(clause: tuple[Term, ...], columns: Mapping[str, Any], n: int) -> Bool:
+    if not clause:
+        return np.zeros(n, np.bool_)
     met = [np.broadcast_to(term.formula.evaluate(columns), (n,)) != 0.0 for term in clause]
     found: Bool = np.logical_or.reduce(met)
     return found

@@ -8,7 +8,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.scenario.odd.bounding import Fit
-from bridgegen.scenario.odd.states import Concept, table
+from bridgegen.scenario.odd.states import Concept, concept_of, table
 
 LITERAL = "categorical_literal"
 
@@ -35,7 +35,7 @@ def named_concepts(fit: Fit) -> dict[str, Concept]:
     names = [*(condition.concept for condition in fit.odd.conditions), *fit.odd.taxonomy]
     found = {}
     for name in dict.fromkeys(names):
-        if (concept := fit.states.concept(name)) is not None:
+        if (concept := concept_of(name)) is not None:
             found[name] = concept
     known = {concept.name for concept in found.values()}
     for concept in table().concepts.values():
@@ -58,7 +58,7 @@ def stated(fit: Fit, row: Mapping[str, float]) -> Iterator[Stated]:
         if value is None:
             continue
         if isinstance(defined, Mapping):
-            literals = fit.literals(name, {key: np.array([x]) for key, x in row.items()})
+            literals = fit.literals(name, {key: np.array([x]) for key, x in row.items()}, defined)
             if found := tuple(literal for literal, met in literals.items() if met[0]):
                 yield Stated(name, LITERAL, found)
         elif isinstance(value, float):
@@ -88,6 +88,12 @@ def cod(fit: Fit, row: Mapping[str, float], of: str) -> str:
         "TAXONOMY:",
     ]
     values = ["COD:", '  - TEMPORAL_EXTENT: ""', '    SPATIAL_EXTENT: ""']
+    quantities = table().quantities
+    measures = {
+        name: quantities[concept.quantity]["measures"]
+        for name, concept in named_concepts(fit).items()
+        if concept.quantity
+    }
     for name, unit, value in stated(fit, row):
         key = json.dumps(f"{name};{unit}", ensure_ascii=False)
         if isinstance(value, tuple):
@@ -98,8 +104,7 @@ def cod(fit: Fit, row: Mapping[str, float], of: str) -> str:
         elif isinstance(value, bool):
             kind, text = "boolean", str(value).lower()
         else:
-            measures = table().quantities[fit.concept(name).quantity]["measures"]
-            kind, text = f"float {measures}", repr(value)
+            kind, text = f"float {measures[name]}", repr(value)
         lines.append(f"  {json.dumps(name, ensure_ascii=False)}: {kind}")
         values.append(f"    {key}: {text}")
     return "\n".join([*lines, *values]) + "\n"

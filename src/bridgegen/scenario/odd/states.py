@@ -83,6 +83,13 @@ def table() -> Table:
     return Table(data["quantities"], concepts, data["units"])
 
 
+def concept_of(name: str) -> Concept | None:
+    """Return the attribute that a file's name stands for; None where no scenario states it."""
+    known = table().concepts
+    name = name.strip().lower()
+    return known.get(name) or known.get(name.rpartition(".")[2] if _is_path(name) else name)
+
+
 @dataclass(frozen=True)
 class Term:
     """Something that holds for some rows: a formula, and the condition that it comes from.
@@ -112,12 +119,6 @@ class States:
     quantities: Mapping[str, Expression]
     on_map: bool
 
-    def concept(self, name: str) -> Concept | None:
-        """Return the attribute that a file's name stands for; None where no scenario states it."""
-        known = table().concepts
-        name = name.strip().lower()
-        return known.get(name) or known.get(name.rpartition(".")[2] if _is_path(name) else name)
-
     def holds(self, condition: Condition, positive: bool, odd: Odd) -> "bool | str | list[Term]":
         """Say when a condition holds, or when it does not.
 
@@ -135,7 +136,7 @@ class States:
         """
         if condition.problem:
             return condition.problem
-        concept = self.concept(condition.concept)
+        concept = concept_of(condition.concept)
         if concept is None:
             return "no scenario states it"
         if condition.missing:
@@ -451,18 +452,27 @@ def _measures_of(roads: RoadsSpec) -> dict[str, Quantity]:
     return found
 
 
+def literals_of(condition: Condition, odd: Odd) -> tuple[str, ...]:
+    """Return the values of a condition; of one above or below a literal, in the order as written.
+
+    Ranges induce the order (section 10.2.2.3), whose example has it as it is written.
+    """
+    defined = odd.taxonomy.get(condition.concept)
+    sign, *rest = condition.values or ("",)
+    if isinstance(defined, Mapping) and sign in ("<", "<=", ">", ">=") and rest[0] in defined:
+        names, at = list(defined), list(defined).index(rest[0])
+        ends = {"<": (0, at), "<=": (0, at + 1), ">": (at + 1, None), ">=": (at, None)}[sign]
+        return tuple(names[slice(*ends)])
+    return condition.values
+
+
 def resolved(condition: Condition, odd: Odd) -> "Condition | Group":
     """Return what defines a condition's literals, where the ODD's taxonomy says it."""
-    literals = odd.taxonomy.get(condition.concept)
-    if not isinstance(literals, Mapping) or condition.problem or not condition.values:
+    defined = odd.taxonomy.get(condition.concept)
+    if not isinstance(defined, Mapping) or condition.problem or not condition.values:
         return condition
-    names = list(literals)
-    values = list(condition.values)
-    if len(values) == 2 and values[0] in ("<", "<=", ">", ">=") and values[1] in names:
-        at = names.index(values[1])
-        ends = {"<": (0, at), "<=": (0, at + 1), ">": (at + 1, None), ">=": (at, None)}[values[0]]
-        values = names[slice(*ends)]
-    formulas = [literals.get(value) for value in values]
-    if formulas and all(formula is not None for formula in formulas):
-        return Group("or", tuple(formula for formula in formulas if formula is not None))
-    return Condition(condition.concept, condition.text, tuple(values), missing=condition.missing)
+    values = literals_of(condition, odd)
+    formulas = [formula for value in values if (formula := defined.get(value)) is not None]
+    if values and len(formulas) == len(values):
+        return Group("or", tuple(formulas))
+    return replace(condition, values=values)
