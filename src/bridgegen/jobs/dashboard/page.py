@@ -506,8 +506,8 @@ def _of_odd(odd: ProjectOdd) -> dict[str, Any] | None:
         [
             each.name,
             _asks(each),
-            f"{each.low:.4g} to {each.high:.4g}" if each.low <= each.high else "–",
-            (charts.strip(each.evaluations), f"{sum(each.failures):,} fail"),
+            _span_of(each.low, each.high) if each.low <= each.high else "–",
+            (charts.strip(each.evaluations), _worst(each)) if any(each.evaluations) else "–",
             f"{each.tested} of {len(each.limits)}" if each.limits else "–",
             Cell(joined(each.untried, 6) or "–", [each.problem] if each.problem else []),
         ]
@@ -527,8 +527,21 @@ def _of_odd(odd: ProjectOdd) -> dict[str, Any] | None:
 
 def _asks(each: OddAttribute) -> str:
     if each.edges and each.unit != "count":
-        return f"{each.edges[0]:.4g} to {each.edges[-1]:.4g} {each.unit}"
+        return f"{_span_of(each.edges[0], each.edges[-1])} {each.unit}"
     return ", ".join(each.labels) or "–"
+
+
+def _span_of(low: float, high: float) -> str:
+    ends = dict.fromkeys(f"{x:,.0f}" if abs(x) >= 1000 else f"{x:.4g}" for x in (low, high))
+    return " to ".join(ends)
+
+
+def _worst(each: OddAttribute) -> str:
+    """Return where the largest part of evaluations fails."""
+    tried = [k for k, n in enumerate(each.evaluations) if n]
+    k = max(tried, key=lambda k: each.failures[k] / each.evaluations[k])
+    n, failed = each.evaluations[k], each.failures[k]
+    return f"{each.labels[k]}: {failed:,} of {n:,} fail" if failed else "none fails"
 
 
 def _attributes(some: Iterable[Covered]) -> Iterator[tuple[str, list[tuple[str, Table, str]]]]:

@@ -90,16 +90,27 @@ class Fit:
             found[literal] = met
         return found
 
+    @property
+    def label(self) -> str:
+        """Its name, and how much of it is not judged."""
+        count = len(self.gaps)
+        words = f", {count} condition{'s' * (count != 1)} not judged" if count else ""
+        return f"ODD {self.odd.name}{words}"
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What a page states of it, by name."""
+        found = {"operational design domain": f"{self.odd.title}, SHA-256 {self.odd.digest}"}
+        found |= {"bounded": "; ".join(self.changes)} if self.changes else {}
+        gaps = "; ".join(f"{condition}: {reason}" for condition, reason in self.gaps.items())
+        return found | ({"not judged of the ODD": gaps} if gaps else {})
+
     def to_lines(self) -> tuple[str, ...]:
         """Return what it does in words: the ODD, its changes, and its gaps."""
-        name = f"ODD {self.odd.name}"
-        title = f" ({self.odd.title})" if self.odd.title != self.odd.name else ""
-        change = "; ".join(self.changes) or "bounds nothing of this scenario's ranges"
-        gaps = "; ".join(f"{condition}: {reason}" for condition, reason in self.gaps.items())
-        lines = [f"{name}{title}: {change}"]
-        if gaps:
-            count = f"{len(self.gaps)} conditions are" if len(self.gaps) > 1 else "1 condition is"
-            lines.append(f"{name}: {count} not judged: {gaps}")
+        name, facts = f"ODD {self.odd.name}", self.facts
+        lines = [f"{name} ({self.odd.title}): {facts.get('bounded', 'narrows nothing')}"]
+        if self.gaps:
+            lines.append(f"{self.label}: {facts['not judged of the ODD']}")
         return (*lines, *(f"{name}: {note}" for note in self.odd.notes))
 
 

@@ -135,6 +135,10 @@ class OddCoverage:
                 have[k, m] |= bool((where[i][k] & where[j][m]).any())
 
 
+def _number(x: float) -> str:
+    return f"{x:,.0f}" if abs(x) >= 1000 else f"{x:.4g}"
+
+
 def _finite(x: float) -> float | None:
     return x if math.isfinite(x) else None
 
@@ -203,7 +207,7 @@ def _attribute(name: str, odd: Odd) -> OddAttribute:
         edges = np.arange(math.ceil(low), math.floor(high) + 2.0).tolist()
         labels = tuple(f"{x:g}" for x in edges[:-1])
     else:
-        labels = tuple(f"{a:.4g} to {b:.4g}" for a, b in pairwise(edges))
+        labels = tuple(f"{_number(a)} to {_number(b)}" for a, b in pairwise(edges))
     reached = tuple(x for x in limits if low <= x <= high)
     return OddAttribute(name, entry["unit"], labels, tuple(edges), reached)
 

@@ -59,11 +59,13 @@ class Table:
         quantities: by name: formula, unit, what it measures, and between what it lies.
         concepts: by the names that files write, in lower case.
         units: by what they measure: the factor into the first.
+        terms: of the ontology, by evidence: what states it.
     """
 
     quantities: Mapping[str, Mapping[str, Any]]
     concepts: Mapping[str, Concept]
     units: Mapping[str, Mapping[str, float]]
+    terms: Mapping[str, Sequence[str]]
 
 
 @cache
@@ -80,7 +82,7 @@ def table() -> Table:
             name, entry["at"], entry.get("quantity", ""), entry.get("bands") or {}, facts, types
         )
         concepts |= dict.fromkeys((name, *entry.get("also", ())), found)
-    return Table(data["quantities"], concepts, data["units"])
+    return Table(data["quantities"], concepts, data["units"], data["terms"])
 
 
 def concept_of(name: str) -> Concept | None:
