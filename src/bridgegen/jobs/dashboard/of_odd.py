@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class ProjectOdd:
     unread: int = 0
     others: set[str] = field(default_factory=set)
     _fits: dict[str, Fit | None] = field(default_factory=dict)
+    _waiting: list[Path] = field(default_factory=list)
 
     @classmethod
     def of(cls, odd: Odd | None) -> "ProjectOdd":
@@ -50,8 +52,14 @@ class ProjectOdd:
             own = odd_of(settings.odd)
             if self.coverage is None:
                 self.coverage = odd_coverage(own)
+                waiting, self._waiting = self._waiting, []
+                for folder in waiting:
+                    with Store.open(folder) as earlier:
+                        self.add(earlier, Settings.from_dict(earlier.settings, folder))
             elif own.digest != self.coverage.odd.digest:
                 self.others.add(own.name)
+        if self.coverage is None:
+            self._waiting.append(store.folder)
         if self.coverage is None or not len(store):
             return
         fit = self._fit(settings, self.coverage.odd)
