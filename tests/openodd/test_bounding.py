@@ -81,7 +81,9 @@ def test_without_anything_to_bound_the_scenario_stays_what_it_is(tmp_path):
     [
         ('operational_speed: "<= 40 km/h"', "", "operational_speed <= 40 km/h"),
         ("drivable_area_type: [town]", "", "motorway"),
-        ('number_of_lanes: ">= 3"', "", "2 count"),
+        ('number_of_lanes: ">= 3"', "", "cut-in has 2"),
+        ('curve_radius: "< 500 m"', "", "cut-in has none"),
+        ("pedestrian: true", "", "pedestrian"),
         ("t_junction: true", "", "t_junction"),
         ("agent_type: [pedestrians]", "", "has car"),
         ("", "agent_type: [motor_vehicle]", "motor_vehicle"),

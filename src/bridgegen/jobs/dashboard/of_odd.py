@@ -86,12 +86,10 @@ class ProjectOdd:
                 read = load(settings.scenario, settings.distribution, settings.empty_trigger)
                 scenario = driven_by(read, settings.others)
                 bound = within(scenario, settings.odd, settings.road_map)
+                is_same = bound.fingerprint == settings.fingerprint
+                is_read = is_same and isinstance(scenario, LogicalScenario)
             except (BridgeGenError, OSError, ValueError):  # ValueError: NUL in a path
-                scenario = bound = None
-            is_same = bound is not None and bound.fingerprint == settings.fingerprint
-            self._fits[key] = (
-                fit_of(scenario, odd, on_map=settings.road_map is not None)
-                if is_same and isinstance(scenario, LogicalScenario)
-                else None
-            )
+                is_read = False
+            on_map = settings.road_map is not None
+            self._fits[key] = fit_of(scenario, odd, on_map=on_map) if is_read else None
         return self._fits[key]

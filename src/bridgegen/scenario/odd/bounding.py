@@ -181,7 +181,7 @@ def _tree(
             return True
         if found is False:
             refused.append(_contradiction(formula, positive, states))
-        return found if isinstance(found, bool) else found[0]
+        return found
     if formula.sign == "not":
         return _tree(formula.parts[0], not positive, odd, states, gaps, refused)
     is_and = (formula.sign == "and") == positive
@@ -199,17 +199,15 @@ def _tree(
 
 def _contradiction(condition: Condition, positive: bool, states: States) -> str:
     concept = concept_of(condition.concept)
-    asks = f"it {'asks' if positive else 'excludes'} {condition.name}"
-    if concept is None:
-        return asks
+    assert concept is not None  # what no scenario states contradicts nothing
     value = states.value(concept, states.scenario.usual_values())
-    unit = "" if isinstance(value, list) else f" {_unit(concept.quantity)}"
-    has = ", ".join(value) if isinstance(value, list) else f"{value:g}{unit}"
-    return f"{asks}, {states.scenario.name} has {has or 'none'}"
-
-
-def _unit(quantity: str) -> str:
-    return str(table().quantities[quantity]["unit"])
+    if isinstance(value, float):
+        unit = table().quantities[concept.quantity]["unit"]
+        has = f"{value:g}" if unit == "count" else f"{value:g} {unit}"
+    else:
+        has = ", ".join(value or ()) or "none"
+    asks = "asks" if positive else "excludes"
+    return f"it {asks} {condition.name}, {states.scenario.name} has {has}"
 
 
 def _clauses(tree: Any) -> Iterator[tuple[Term, ...]]:

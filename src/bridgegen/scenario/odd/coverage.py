@@ -217,7 +217,7 @@ def _is_stated(value: str, own: Mapping[str, Any], defined: Any, flag: bool) -> 
     if isinstance(defined, Mapping) and defined.get(value) is not None:
         return True
     if flag and value == "false":
-        return own["true"] != "always"
+        return bool(own["true"] != "always")
     return own.get(value) not in (None, "never")
 
 

@@ -121,7 +121,7 @@ class States:
     quantities: Mapping[str, Expression]
     on_map: bool
 
-    def holds(self, condition: Condition, positive: bool, odd: Odd) -> "bool | str | list[Term]":
+    def holds(self, condition: Condition, positive: bool, odd: Odd) -> "bool | str | Term":
         """Say when a condition holds, or when it does not.
 
         Args:
@@ -131,7 +131,7 @@ class States:
             odd: that asks it.
 
         Returns:
-            Always or never; why that cannot be said; or terms of which one is enough.
+            Always or never; why that cannot be said; or the rows in which it is so.
 
         Raises:
             FileFormatError: a unit of another dimension.
@@ -238,43 +238,34 @@ class States:
 
     def _of_types(
         self, concept: Concept, condition: Condition, positive: bool
-    ) -> "bool | str | list[Term]":
-        is_flag = tuple(concept.types) == ("true",)
-        asked = set(condition.values)
+    ) -> "bool | str | Term":
+        is_flag, asked = tuple(concept.types) == ("true",), set(condition.values)
         strange = sorted(asked - ({"true", "false"} if is_flag else concept.types.keys()))
         if strange:
             return _strange(strange)
-        kinds = {kind for value in asked for kind in concept.types.get(value, ())}
-        if is_flag:
-            if asked == {"true", "false"}:
-                return positive
-            kinds = set(concept.types["true"])
-            any_of_them = ("true" in asked) == positive
-            wanted = [(kinds, any)] if any_of_them else [(kinds, None)]
-        else:
-            wanted = [(kinds, all)] if positive else [(kinds, None)]
-        chosen, how = wanted[0]
+        if {"true", "false"} <= asked:
+            return positive
+        # Of a flag one participant is enough, or none may be; of types each has one that is asked,
+        # or none has.
+        one_is_enough = is_flag and ("true" in asked) == positive
+        wanted = {kind for each in asked for kind in concept.types.get(each, ())}
+        wanted = set(concept.types["true"]) if is_flag else wanted
+        inside = one_is_enough or (positive and not is_flag)
         certain: list[bool] = []
         varying: list[str] = []
         for each in self.scenario.participants:
             if each.name == "ego":
                 continue
             types = each.types if each.type_by else (each.model or each.type,)
-            fits = [(kind_of(name) in chosen) == (how is not None) for name in types]
-            if len(set(fits)) == 1:
-                certain.append(fits[0])
+            fits = [name for name in types if (kind_of(name) in wanted) == inside]
+            if len(fits) in (0, len(types)):
+                certain.append(bool(fits))
             else:
-                names = [name for name, fit in zip(types, fits, strict=True) if fit]
-                varying.append(" or ".join(f"{each.type_by} == {name}" for name in names))
-        if how is any:
-            if any(certain):
-                return True
-            return self._terms(" or ".join(varying), condition, positive) if varying else False
-        if not all(certain):
-            return False
-        if not varying:
-            return True
-        return self._terms(" and ".join(f"({text})" for text in varying), condition, positive)
+                varying.append(" or ".join(f"{each.type_by} == {name}" for name in fits))
+        if one_is_enough in certain or not varying:
+            return any(certain) if one_is_enough else all(certain)
+        sign = " or " if one_is_enough else " and "
+        return self._term(sign.join(f"({text})" for text in varying), condition, positive)
 
     def _of_quantity(
         self,
@@ -283,7 +274,7 @@ class States:
         concept: Concept,
         positive: bool,
         odd: Odd,
-    ) -> "bool | str | list[Term]":
+    ) -> "bool | str | Term":
         spans: list[tuple[float, float, bool, bool]] = []
         if condition.values:
             strange = sorted(set(condition.values) - concept.bands.keys())
@@ -306,23 +297,18 @@ class States:
             return not positive
         pieces = [_inside(formula, *span) for span in spans]
         text = " or ".join(f"({piece})" for piece in pieces)
-        return self._terms(text if positive else f"not ({text})", condition, positive)
+        return self._term(text if positive else f"not ({text})", condition, positive)
 
-    def _terms(self, text: str, condition: Condition, positive: bool) -> "bool | list[Term]":
+    def _term(self, text: str, condition: Condition, positive: bool) -> "bool | Term":
         categories = {
             name: parameter.kind.names
             for name, parameter in self.scenario.parameters.items()
             if parameter.kind.names
         }
-        formula = parse(text, odd_place(condition), categories, longest=LONG, deepest=64)
+        formula = parse(text, f"of {condition.name}", categories, longest=LONG, deepest=64)
         if not formula.names:
             return bool(formula.evaluate({}))
-        return [Term(formula, condition.name if positive else f"not {condition.name}")]
-
-
-def odd_place(condition: Condition) -> str:
-    """Return what a formula is of, for messages."""
-    return f"of {condition.name}"
+        return Term(formula, condition.name if positive else f"not {condition.name}")
 
 
 def _strange(values: Iterable[str]) -> str:
