@@ -104,6 +104,23 @@ def test_a_condition_that_no_number_can_keep_is_refused(tmp_path, text):
         bounded(load("cut-in"), _odd(tmp_path, text))
 
 
+def test_literals_that_define_each_other_are_refused(tmp_path):
+    more = "TAXONOMY:\n  a:\n    x: {b: y}\n  b:\n    y: {a: x}\n"
+    with refuses(FileFormatError, "a → b → a"):
+        bounded(load("cut-in"), _odd(tmp_path, "a: x", more=more))
+
+
+def test_modules_that_double_at_each_step_are_refused_at_once(tmp_path):
+    lines = ["MODULES:"]
+    for number in range(25):
+        nested = f"      OR:\n        m{number + 1}: true"
+        lines += [f"  m{number}:", "    INCLUDE_AND:", f"      m{number + 1}: true", nested]
+    lines += ["  m25:", "    INCLUDE_AND:", '      rainfall_rate: "< 1 mm/h"']
+    (tmp_path / "odd.yaml").write_text("\n".join(lines) + "\n")
+    with refuses(FileFormatError, "5,000"):
+        bounded(load("cut-in"), read_odd(tmp_path / "odd.yaml"))
+
+
 def test_where_narrowing_would_leave_no_value_rows_are_refused_instead(tmp_path):
     """Fog that wind takes away: a bound of the weather stands against the ODD's range."""
     scenario = bounded(load("cut-in"), _odd(tmp_path, 'visibility: "< 500 m"'))

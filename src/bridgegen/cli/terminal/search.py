@@ -358,9 +358,8 @@ def print_coverage(
 
 
 def _print_odd(found: "OddCoverage") -> None:
-    have, pairs = found.pair_counts
     title = f"{found.odd.name} ({found.odd.title})"
-    print(f"\nOf the ODD {title}; of pairs of values {have:,} of {pairs:,}:")
+    print(f"\nOf the ODD {title}, {found.pairs_in_words}:")
     rows = [
         (
             each.name,

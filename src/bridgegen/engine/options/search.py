@@ -36,8 +36,7 @@ MAX_AHEAD = 10_000
 
 OF_ODD = option(
     ODD,
-    "Operational design domain that bounds scenarios: a file in ASAM OpenODD 1.0's YAML.",
-    shown="none",
+    "Operational design domain: an ASAM OpenODD 1.0 file.",
     before=None,
 )
 """Metadata of the field of an operational design domain."""

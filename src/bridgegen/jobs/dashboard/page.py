@@ -494,11 +494,10 @@ def _of_odd(odd: ProjectOdd) -> dict[str, Any] | None:
     found = odd.coverage
     if found is None:
         return None
-    have, pairs = found.pair_counts
     words = [
         f"{counted(odd.runs, 'run')}: {counted(found.evaluations, 'evaluation')} inside, of which "
         f"{found.failures:,} fail; {odd.outside:,} outside",
-        f"{have:,} of {pairs:,} pairs of values tried",
+        found.pairs_in_words,
     ]
     words += [f"not read of {counted(odd.unread, 'run')}"] if odd.unread else []
     words += [f"other ODDs bound runs, too: {joined(sorted(odd.others))}"] if odd.others else []

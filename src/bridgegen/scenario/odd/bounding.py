@@ -13,7 +13,16 @@ from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.parameters import Axis, Bound, Parameter
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.odd.reader import Condition, Group, Odd
-from bridgegen.scenario.odd.states import LONG, States, Term, concept_of, resolved, states_of, table
+from bridgegen.scenario.odd.states import (
+    LONG,
+    States,
+    Term,
+    concept_of,
+    resolved,
+    size_of,
+    states_of,
+    table,
+)
 
 MOST_CLAUSES = 256
 """Most clauses that the conditions of an ODD are brought to, one by one: more are one check."""
@@ -152,6 +161,7 @@ def fit_of(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> Fit:
     Raises:
         FileFormatError: a condition's unit is of another dimension.
     """
+    size_of(odd)
     states, gaps, refused = states_of(scenario, on_map=on_map), dict[str, str](), list[str]()
     tree = _tree(odd.formula, True, odd, states, gaps, refused)
     if tree is False:

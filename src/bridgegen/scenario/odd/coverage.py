@@ -21,10 +21,14 @@ from bridgegen.scenario.odd.states import (
     in_unit,
     literals_of,
     resolved,
+    size_of,
     table,
 )
 
 BINS = 5
+MOST_WORK = 1_000_000
+"""Largest product of conditions and squared attributes of an ODD whose pairs are counted."""
+
 NEAR = 0.01
 """Part of an attribute's range inside the ODD within which a value counts as on its limit."""
 
@@ -101,6 +105,12 @@ class OddCoverage:
         have = sum(int((self.pairs[key] & self.possible[key]).sum()) for key in self.pairs)
         return have, sum(int(found.sum()) for found in self.possible.values())
 
+    @property
+    def pairs_in_words(self) -> str:
+        """How many pairs rows have."""
+        have, possible = self.pair_counts
+        return f"{have:,} of {possible:,} pairs of values tried" if possible else "no pairs counted"
+
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON's types."""
         have, possible = self.pair_counts
@@ -145,9 +155,12 @@ def _finite(x: float) -> float | None:
 
 def odd_coverage(odd: Odd) -> OddCoverage:
     """Return the attributes of an ODD, of which nothing is covered yet."""
+    size = size_of(odd)
     names = dict.fromkeys(condition.concept for condition in odd.conditions)
     attributes = tuple(_attribute(name, odd) for name in names)
     found = OddCoverage(odd, attributes)
+    if len(attributes) ** 2 * size > MOST_WORK:
+        return found  # pairs of a stranger's ODD could take hours
     for i, j in combinations(range(len(attributes)), 2):
         a, b = attributes[i], attributes[j]
         if a.labels and b.labels:

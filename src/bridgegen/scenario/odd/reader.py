@@ -17,7 +17,7 @@ from typing import Any
 
 from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.scenario.language.parameters import nearest
-from bridgegen.scenario.language.plain_yaml import MAX_BYTES, Document, read_plain_yaml
+from bridgegen.scenario.language.plain_yaml import MAX_BYTES, MAX_DEPTH, Document, read_plain_yaml
 
 MAX_FILES = 32
 MAX_LINE = 4000
@@ -371,6 +371,9 @@ class _Modules:
             return self.made[name]
         document, key, body = self.modules[name]
         path = (key, name)
+        if len(inside) > MAX_DEPTH:
+            self.problems.at(document, path, f"modules may refer {MAX_DEPTH} deep")
+            return Group("and", ())
         if name in inside:
             cycle = " → ".join((*inside[inside.index(name) :], name))
             self.problems.at(document, path, f"modules refer to each other: {cycle}")

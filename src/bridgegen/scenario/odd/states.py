@@ -26,6 +26,8 @@ CLOSE = 1e-9
 STRAIGHT = 1e6
 """Radius [m] of what is no bend, and of no other quantity that a scenario states."""
 
+MOST_CONDITIONS = 5_000
+
 LONG = 100_000
 """Most characters of a formula that an ODD's conditions make."""
 
@@ -452,6 +454,37 @@ def literals_of(condition: Condition, odd: Odd) -> tuple[str, ...]:
         ends = {"<": (0, at), "<=": (0, at + 1), ">": (at + 1, None), ">=": (at, None)}[sign]
         return tuple(names[slice(*ends)])
     return condition.values
+
+
+def size_of(odd: Odd) -> int:
+    """Return the number of conditions that an ODD asks, with those that define its literals.
+
+    Raises:
+        FileFormatError: literals define each other, or they are more than `MOST_CONDITIONS`.
+    """
+    sizes: dict[int, int] = {}
+
+    def size(part: Condition | Group, inside: tuple[str, ...]) -> int:
+        # Modules are shared, and counted once for each that refers to them: two that refer twice
+        # to the next, 32 deep, ask 2³² conditions.
+        if id(part) in sizes:
+            return sizes[id(part)]
+        parts: Sequence[Condition | Group] = ()
+        if isinstance(part, Group):
+            parts = part.parts
+        elif isinstance(meant := resolved(part, odd), Group):
+            if part.concept in inside:
+                cycle = " → ".join((*inside, part.concept))
+                raise FileFormatError(f"literals define each other: {cycle} ({odd.path})")
+            parts, inside = meant.parts, (*inside, part.concept)
+        found = sum(size(each, inside) for each in parts) or 1
+        if found > MOST_CONDITIONS:
+            what = f"an ODD may ask {MOST_CONDITIONS:,} conditions, with those of modules that"
+            raise FileFormatError(f"{what} several others refer to ({odd.path})")
+        sizes[id(part)] = found
+        return found
+
+    return size(odd.formula, ())
 
 
 def resolved(condition: Condition, odd: Odd) -> "Condition | Group":
