@@ -82,14 +82,15 @@ class ProjectOdd:
             [settings.scenario, settings.others, settings.road_map, settings.fingerprint]
         )
         if key not in self._fits:
+            self._fits[key] = None
             try:
                 read = load(settings.scenario, settings.distribution, settings.empty_trigger)
                 scenario = driven_by(read, settings.others)
                 bound = within(scenario, settings.odd, settings.road_map)
                 is_same = bound.fingerprint == settings.fingerprint
-                is_read = is_same and isinstance(scenario, LogicalScenario)
+                if is_same and isinstance(scenario, LogicalScenario):
+                    on_map = settings.road_map is not None
+                    self._fits[key] = fit_of(scenario, odd, on_map=on_map)
             except (BridgeGenError, OSError, ValueError):  # ValueError: NUL in a path
-                is_read = False
-            on_map = settings.road_map is not None
-            self._fits[key] = fit_of(scenario, odd, on_map=on_map) if is_read else None
+                pass
         return self._fits[key]
