@@ -126,3 +126,24 @@ def test_a_scenario_file_and_a_scenario_outside_are_refused(tmp_path):
     run = bg.run_search("cut-in", ego="route-follower", budget=4, keep=1, out=tmp_path / "run")
     with refuses(UnsupportedError, "0001"):
         within(load(run.scenarios[0]), EXAMPLE)
+
+
+def test_a_risk_inside_states_no_rate_of_all_encounters(tmp_path, cli):
+    exposure = EXAMPLE.with_name("cut-in-exposure.yaml")
+    words = ("--exposure", exposure, "--odd", EXAMPLE, "--budget", "500", "--method", "mc")
+    status, out, _ = cli("risk", "cut-in", *words, "--out", tmp_path / "risk")
+    assert status == 0
+    approve(out, "inside it")
+    assert "per km" not in out
+
+
+def test_a_comparison_of_algorithms_stays_inside(tmp_path, cli):
+    words = ("--algorithms", "random,pso", "--seeds", "1", "--budget", "30", "--odd", EXAMPLE)
+    status, _, error = cli(
+        "benchmark", "algorithms", "cut-in", *words, "--out", tmp_path / "comparison"
+    )
+    assert (status, error.count("Traceback")) == (0, 0)
+    runs = [bg.Run(path.parent) for path in (tmp_path / "comparison").rglob("run.sqlite")]
+    assert len(runs) == 2
+    for run in runs:
+        assert run.rows().X[:, run.parameters.index("ego_speed")].max() <= 25.0

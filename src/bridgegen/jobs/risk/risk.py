@@ -197,6 +197,9 @@ def estimate_risk(given: RiskOptions) -> Risk:
         )
     driven = cast(LogicalScenario, within(driven_by(logical, given.others), given.odd))
     met = _exposure(driven, given.exposure)
+    if driven.odd is not None:
+        # Hours and kilometres count encounters outside the ODD, too, of which nothing is simulated.
+        met = replace(met, encounters=None)
     if met.dimensions == 0:
         raise InputError(
             f"the exposure of {driven.name} distributes no parameter: nothing is random"
