@@ -9,9 +9,10 @@ import pytest
 from tests.approval import approve, refuses
 
 import bridgegen as bg
-from bridgegen.base.errors import ScenarioError, UnsupportedError
+from bridgegen.base.errors import InputError, ScenarioError, UnsupportedError
 from bridgegen.jobs.dashboard.dashboard import build_dashboard
 from bridgegen.jobs.preventability.preventability import map_preventability
+from bridgegen.jobs.risk.risk import estimate_risk
 from bridgegen.jobs.search.campaign import resume
 from bridgegen.jobs.search.scenarios import load, within
 from bridgegen.jobs.suite.suite import run_suite
@@ -147,3 +148,13 @@ def test_a_comparison_of_algorithms_stays_inside(tmp_path, cli):
     assert len(runs) == 2
     for run in runs:
         assert run.rows().X[:, run.parameters.index("ego_speed")].max() <= 25.0
+
+
+def test_a_beta_distribution_of_a_range_that_the_odd_narrows_is_refused(tmp_path):
+    text = EXAMPLE.with_name("cut-in-exposure.yaml").read_text(encoding="utf-8")
+    normal = "{distribution: normal, mean: 100 km/h, deviation: 3}"
+    assert normal in text
+    path = tmp_path / "exposure.yaml"
+    path.write_text(text.replace(normal, "{distribution: beta, alpha: 2, beta: 2}"))
+    with refuses(InputError, "ego_speed"):
+        estimate_risk("cut-in", exposure=path, odd=EXAMPLE, out=tmp_path / "risk")

@@ -200,6 +200,14 @@ def estimate_risk(given: RiskOptions) -> Risk:
     if driven.odd is not None:
         # Hours and kilometres count encounters outside the ODD, too, of which nothing is simulated.
         met = replace(met, encounters=None)
+        for name, marginal in met.marginals.items():
+            before, now = logical.parameters[name], driven.parameters[name]
+            # A beta distribution is of its range: over a narrower one it would be another.
+            if (before.low, before.high) != (now.low, now.high) and "Beta" in repr(marginal):
+                raise InputError(
+                    f"{name} has a beta distribution over its range, which the ODD narrows to "
+                    f"{now.low:g} to {now.high:g} {now.unit}: state another distribution"
+                )
     if met.dimensions == 0:
         raise InputError(
             f"the exposure of {driven.name} distributes no parameter: nothing is random"
