@@ -243,6 +243,7 @@ def simulate(
     ],
     fix: common.Fix = None,
     distribution: common.Distribution = None,
+    odd: common.Odd = None,
     road_map: common.RoadMap = None,
     junction: common.Junction = None,
     objective: common.Objective = None,
@@ -298,7 +299,7 @@ def simulate(
     skipped: list[str] | None = [] if lenient else None
     file, runs = Path(scenario), common.read_simulator(simulator, simulator_set, connection)
     is_logical = file.suffix.lower() in (".yaml", ".yml") or not (file.suffix or file.exists())
-    if is_logical or fix or distribution:
+    if is_logical or fix or distribution or odd:
         from bridgegen.jobs.search.model import simulate_scenario  # takes longer than a file
 
         if dt is not None or lenient:
@@ -306,7 +307,7 @@ def simulate(
         options = CommonOptions(
             ego=ego, ideal=stages or (), vehicle=vehicle, others=others, time_limit=time_limit,
             empty_trigger=empty_trigger, fixed=read_fixed(fix, "--fix"), distribution=distribution,
-            road_map=road_map, junction=junction, critical=critical,
+            odd=odd, road_map=road_map, junction=junction, critical=critical,
             objective=read_terms(objective, "--objective"), metrics=read_names(metrics),
             criteria=[one.to_dict() for one in criteria.criteria],
         )  # fmt: skip

@@ -157,7 +157,9 @@ def build_report(
         harm=pipeline.objective.harm if rule != "thresholds" else "",
         criteria=pipeline.objective.criteria,
         hashes=hashes,
+        odd="" if scenario.odd is None else scenario.odd.label,
         settings={
+            **({} if scenario.odd is None else scenario.odd.facts),
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
             **wanted,
             "simulated": f"{embedded.duration:g} s at {embedded.time_step:g} s",

@@ -62,6 +62,8 @@ class RunSummary:
         criteria: names of the margins that make a scenario critical, where pass criteria do.
         hashes: of the run's inputs and results, name → digest.
         settings: further settings, name → text, in display order.
+        odd: the operational design domain that bounds it, and how much of that is not judged; ""
+            without one.
     """
 
     scenario: str
@@ -96,6 +98,7 @@ class RunSummary:
     baseline: str = ""
     hashes: Mapping[str, str] | None = None
     settings: Mapping[str, str] | None = None
+    odd: str = ""
 
 
 WHOLE = ("d_min", "v_d", "n_collision", "harm", "harm_any", "severity")

@@ -162,7 +162,15 @@ def _summary(data: ReportData) -> dict[str, Any]:
     return {
         "title": s.title,
         "description": s.description,
-        "facts": [s.scenario, s.road, f"ego {s.ego}", *baseline, s.algorithm, f"seed {s.seed}"],
+        "facts": [
+            s.scenario,
+            *filter(None, [s.odd]),
+            s.road,
+            f"ego {s.ego}",
+            *baseline,
+            s.algorithm,
+            f"seed {s.seed}",
+        ],
         "finished": s.finished,
         "budget": int(s.budget),
         "critical_rule": s.critical_rule,

@@ -13,6 +13,7 @@ from bridgegen.base.disk import write_whole
 from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
 from bridgegen.jobs.dashboard.odd import Coverage, Covered
+from bridgegen.jobs.dashboard.of_odd import ProjectOdd
 from bridgegen.jobs.dashboard.requirements import Matrix, statements
 from bridgegen.jobs.dashboard.results import Result, versions
 from bridgegen.jobs.dashboard.results_of import SuiteLine
@@ -25,6 +26,7 @@ from bridgegen.pages.sentences import share
 from bridgegen.pages.templates import Banner, Cell, counted, joined, when
 from bridgegen.pages.thumbnails import Thumbnail, drawn, read_thumbnails
 from bridgegen.results.failures import FILE
+from bridgegen.scenario.odd.coverage import OddAttribute
 
 MOST_MODES = 300
 """Largest number of failure modes of a table; the others are counted."""
@@ -121,6 +123,7 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         covered="Taxonomy: {} covered, {} not covered, {} not expressible".format(
             *found.coverage.counts
         ),
+        of_odd=_of_odd(found.project.odd),
         attributes=[*_attributes(found.coverage.attributes)],
         partly=sorted(partly),
         parameters=_parameters(found.coverage),
@@ -483,7 +486,61 @@ def _once(some: list[Series], base: str) -> Table:
     return _table("Measured once", heads, rows, title=title)
 
 
-# --- The operational design domain: the taxonomy, then parameters ---
+# --- The operational design domain: its file, the taxonomy, then parameters ---
+
+
+def _of_odd(odd: ProjectOdd) -> dict[str, Any] | None:
+    """Return the project's ODD: its name, a sentence, and its attributes; None without one."""
+    found = odd.coverage
+    if found is None:
+        return None
+    words = [
+        f"{counted(odd.runs, 'run')}: {counted(found.evaluations, 'evaluation')} inside, of which "
+        f"{found.failures:,} fail; {odd.outside:,} outside",
+        found.pairs_in_words,
+    ]
+    words += [f"not read of {counted(odd.unread, 'run')}"] if odd.unread else []
+    words += [f"other ODDs bound runs, too: {joined(sorted(odd.others))}"] if odd.others else []
+    rows = [
+        [
+            each.name,
+            _asks(each),
+            _span_of(each.low, each.high) if each.low <= each.high else "–",
+            (charts.strip(each.evaluations), _worst(each)) if any(each.evaluations) else "–",
+            f"{each.tested} of {len(each.limits)}" if each.limits else "–",
+            Cell(joined(each.untried, 6) or "–", [each.problem] if each.problem else []),
+        ]
+        for each in found.attributes
+    ]
+    heads = (
+        "attribute",
+        "inside",
+        "searched",
+        "evaluations by value",
+        "limits tried",
+        "never tried",
+    )
+    title = f"{found.odd.title} ({found.odd.name})"
+    return {"title": title, "words": "; ".join(words) + ".", "table": _table(title, heads, rows)}
+
+
+def _asks(each: OddAttribute) -> str:
+    if each.edges and each.unit != "count":
+        return f"{_span_of(each.edges[0], each.edges[-1])} {each.unit}"
+    return ", ".join(each.labels) or "–"
+
+
+def _span_of(low: float, high: float) -> str:
+    ends = dict.fromkeys(f"{x:,.0f}" if abs(x) >= 1000 else f"{x:.4g}" for x in (low, high))
+    return " to ".join(ends)
+
+
+def _worst(each: OddAttribute) -> str:
+    """Return where the largest part of evaluations fails."""
+    tried = [k for k, n in enumerate(each.evaluations) if n]
+    k = max(tried, key=lambda k: each.failures[k] / each.evaluations[k])
+    n, failed = each.evaluations[k], each.failures[k]
+    return f"{each.labels[k]}: {failed:,} of {n:,} fail" if failed else "none fails"
 
 
 def _attributes(some: Iterable[Covered]) -> Iterator[tuple[str, list[tuple[str, Table, str]]]]:

@@ -66,6 +66,8 @@ def facts(risk: Risk) -> Iterator[str]:
     yield f"method {risk.estimated.method}"
     yield f"{percent(risk.exposure.feasible_share.estimate)} of the exposure keep the constraints"
     yield f"seed {risk.seed}"
+    if risk.exposure.scenario.odd is not None:
+        yield f"{risk.exposure.scenario.odd.label}: per encounter inside it"
 
 
 def unsure(risk: Risk) -> Iterator[str]:

@@ -48,6 +48,8 @@ def lines(risk: Risk) -> Iterator[str | Table]:
         rows.append(row)
     head = ("", "per encounter", "95 %", "below (95 %)", "effective rows")
     yield Table((*head, *(f"per {unit}" for unit in units)), rows)
+    if (odd := risk.exposure.scenario.odd) is not None:
+        yield f"{odd.label}: probabilities are per encounter inside it; rates are not known"
     for doubt in risk.weighted.doubts:
         yield f"\ndoubt       {doubt}"
     yield f"\n{'method':<12}{risk.estimated.method}: {risk.estimated.why}"

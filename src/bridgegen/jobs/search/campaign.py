@@ -41,6 +41,7 @@ from bridgegen.jobs.search.scenarios import (
     is_file,
     load,
     refuse_standstill,
+    within,
 )
 from bridgegen.jobs.search.screening import BATCH, require_screen, screen_budget
 from bridgegen.jobs.search.searcher import FailingDriver, require_asynchronous, searcher_of
@@ -131,6 +132,7 @@ def run_search(given: SearchArguments) -> Run:
     catalogue = driven_by(
         load(given.scenario, given.distribution, given.empty_trigger), given.others
     )
+    catalogue = within(catalogue, given.odd, given.road_map)
     budget = catalogue.budget if given.budget is None else given.budget
     seed = catalogue.seed if given.seed is None else given.seed
     if problems := range_problems(replace(given, budget=budget, seed=seed)):

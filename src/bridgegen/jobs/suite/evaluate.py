@@ -15,7 +15,7 @@ from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads
-from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load
+from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load, within
 from bridgegen.jobs.suite.clauses import judged
 from bridgegen.jobs.suite.drawn import Draw, drawn
 from bridgegen.jobs.suite.entries import Entry
@@ -106,15 +106,16 @@ def evaluate(job: Job) -> EntryResult:
 
 
 def scenario_of(job: Job) -> SearchedScenario:
-    """Return the scenario of an entry.
+    """Return the scenario of an entry, within the operational design domain if one is given.
 
     Raises:
-        InputError: the files cannot be read.
+        InputError: the files cannot be read, or nothing of it lies in that domain.
     """
     entry = job.entry
     is_file = entry.scenario.lower().endswith(".xosc")
     trigger = job.options.empty_trigger if is_file else None
-    return driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
+    scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
+    return within(scenario, job.options.odd)
 
 
 def pipeline_of(job: Job) -> Pipeline:

@@ -292,6 +292,7 @@ def _settings(options: ScenariosOptions, simulator: SimulatorChoice) -> dict[str
         "empty_trigger": options.empty_trigger,
         "time_limit": options.time_limit,
         "version": version("bridgegen"),
+        **({} if options.odd is None else {"odd": options.odd}),
     }
 
 
