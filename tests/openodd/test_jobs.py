@@ -104,6 +104,17 @@ def test_a_suite_does_not_run_what_is_outside(tmp_path):
     assert "excludes every row of lead-brakes" in problems["lead-brakes"]
 
 
+def test_a_suites_variations_are_run_again_in_its_odd(tmp_path, cli):
+    key, out, suite = str(tmp_path / "key"), str(tmp_path / "out"), ["suite"]
+    assert cli(*suite, "commit", "cut-in", "--key", key, "--number", "10")[0] == 0
+    words = ["cut-in", "--ego", "route-follower", "--odd", str(EXAMPLE), "--out", out]
+    cli(*suite, *words, "--assessor", key)
+    code, said, err = cli(*suite, "verify", f"{out}/sealed.json", "cut-in", "--ego=route-follower")
+    assert (code, "to the bit" in said) == (0, True), err
+    code, said, err = cli(*suite, "replay", out, "cut-in", "1")
+    assert (code, said.count("to the bit")) == (0, 2), said + err
+
+
 def test_a_map_of_what_is_preventable_stays_inside(tmp_path):
     with refuses(Exception, "ego_speed"):
         map_preventability(

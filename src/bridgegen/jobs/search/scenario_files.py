@@ -44,7 +44,7 @@ def write_scenario(
     noise: str | None = None,
     conflict: ConflictSummary | None = None,
 ) -> list[Path]:
-    """Write one row as ``name.owl``, ``name.xodr`` and ``name.xosc``; return their paths.
+    """Write one row as ``name.owl``, ``name.xodr`` and ``name.xosc``; return their paths, so.
 
     A scenario that an ODD bounds has its current operational domain beside it, ``name.cod.yaml``.
 
@@ -86,10 +86,9 @@ def write_scenario(
     xosc.write_bytes(scenario_xml(keyed(storyboard, noise) if noise else storyboard))
     files = [xodr, xosc]
     if pipeline.scenario.odd is not None:
-        files.append(folder / f"{name}.cod.yaml")
-        files[-1].write_text(
-            cod(pipeline.scenario.odd, pipeline.space.values(x), xosc.name), encoding="utf-8"
-        )
+        domain = cod(pipeline.scenario.odd, pipeline.space.values(x), xosc.name)
+        files.insert(0, folder / f"{name}.cod.yaml")
+        files[0].write_text(domain, encoding="utf-8")
     if individuals is None:
         return files
     save(individuals, owl)

@@ -42,6 +42,7 @@ class _Settings(Strict):
     driver_name: str | None = None
     secret: str | None = None
     drawn: int = 0
+    odd: dict[str, Any] | None = None
     version: str
 
 
@@ -145,6 +146,7 @@ def _of_file(job: Job, pipeline: Pipeline, file: Path) -> EntryResult:
         count=pipeline.objective.count,
         others=None,
         empty_trigger=None,
+        odd=None,
     )
     return evaluate(replace(job, entry=Entry(file.stem, str(file)), options=options, only=None))
 
@@ -193,6 +195,7 @@ def job_of(suite: SuiteRun, result: EntryResult, simulator: SimulatorChoice | No
         others=settings.others,
         empty_trigger=settings.empty_trigger,
         time_limit=settings.time_limit,
+        odd=settings.odd,
     )
     entry = indexed(Entry(result.entry, result.scenario, result.distribution or None))
     chosen = SimulatorChoice(
