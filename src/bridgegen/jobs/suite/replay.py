@@ -148,7 +148,8 @@ def _of_file(job: Job, pipeline: Pipeline, file: Path) -> EntryResult:
         empty_trigger=None,
         odd=None,
     )
-    return evaluate(replace(job, entry=Entry(file.stem, str(file)), options=options, only=None))
+    entry = Entry(file.stem, str(file))
+    return evaluate(replace(job, entry=entry, options=options, only=None, draw=None))
 
 
 def _moves_alike(row: RowResult, exported: EntryResult) -> bool:
