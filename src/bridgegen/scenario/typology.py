@@ -3,7 +3,7 @@
 ``typology.yaml`` has the figures, each typology with its source and how its figures are known.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
@@ -68,11 +68,15 @@ class Typology:
     @property
     def uncovered(self) -> tuple[CrashType, ...]:
         """The others, the most harmful first; where no harm is known, the most common."""
-        some = [kind for kind in self.types if not kind.scenarios]
-        return tuple(sorted(some, key=lambda kind: (-(kind.harm or 0), -(kind.percent or 0))))
+        return most_harmful(kind for kind in self.types if not kind.scenarios)
 
 
-def total_of(types: tuple[CrashType, ...], quantity: str = "percent") -> float | None:
+def most_harmful(types: Iterable[CrashType]) -> tuple[CrashType, ...]:
+    """Return types, the most harmful first; where no harm is known, the most common."""
+    return tuple(sorted(types, key=lambda kind: (-(kind.harm or 0.0), -(kind.percent or 0.0))))
+
+
+def total_of(types: Sequence[CrashType], quantity: str = "percent") -> float | None:
     """Return the share of some types together [%], of crashes or of ``harm``; None: not known."""
     values = [getattr(kind, quantity) for kind in types]
     return None if not values or None in values else sum(values)
@@ -85,17 +89,22 @@ def named(kind: CrashType) -> str:
     return " ".join((kind.name, *([f"({', '.join(words)})"] if words else [])))
 
 
-def said(typology: Typology, covered: tuple[CrashType, ...] | None = None) -> str:
-    """Return in words how much of a typology some types are; of those with a scenario by default.
+def shares(types: Sequence[CrashType]) -> str:
+    """Return in words the shares of some types together; "" where none is known."""
+    named = (("percent", "crashes"), ("harm", "harm"))
+    found = [(total_of(types, quantity), what) for quantity, what in named]
+    words = [f"{percent(share / 100)} of the {what}" for share, what in found if share is not None]
+    return f", with {' and '.join(words)}" if words else ""
 
-    What is not known is said.
-    """
-    some = typology.covered if covered is None else covered
-    share, harm = total_of(some), total_of(some, "harm")
-    words = f"{len(some)} of {len(typology.types)} types"
-    words += f", with {percent(share / 100)} of the crashes" if share is not None else ""
-    words += f", {percent(harm / 100)} of the harm" if harm is not None else ""
-    missing = ["crashes"] * (share is None) + ["harm"] * (harm is None)
+
+def said(typology: Typology) -> str:
+    """Return in words how much of a typology scenarios cover, and what is not known."""
+    missing = [
+        what
+        for quantity, what in (("percent", "crashes"), ("harm", "harm"))
+        if total_of(typology.types, quantity) is None
+    ]
+    words = f"{len(typology.covered)} of {len(typology.types)} types{shares(typology.covered)}"
     return (
         f"{words} (shares of {' and of '.join(missing)} by type: not known)" if missing else words
     )

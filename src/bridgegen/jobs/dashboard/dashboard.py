@@ -9,6 +9,7 @@ from typing import Any
 from bridgegen.base.disk import refuse_other
 from bridgegen.base.errors import FileFormatError
 from bridgegen.engine.options import called_with
+from bridgegen.jobs.dashboard.crash_types import CrashTypes, crash_types
 from bridgegen.jobs.dashboard.modes import (
     OpenMode,
     contradictions,
@@ -22,6 +23,7 @@ from bridgegen.jobs.dashboard.options import DashboardOptions
 from bridgegen.jobs.dashboard.project import Project, read_project
 from bridgegen.jobs.dashboard.requirements import Matrix, matrices
 from bridgegen.jobs.dashboard.trends import Series, trends
+from bridgegen.jobs.dashboard.verdicts import standings
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.results.failures import (
     FILE,
@@ -129,6 +131,11 @@ class Dashboard:
         """The labels of all drivers, each version by itself."""
         return sorted({result.driver.label for result in self.project.results})
 
+    @cached_property
+    def crash_types(self) -> CrashTypes | None:
+        """How drivers stand in the types of crashes; None where few scenarios were tried."""
+        return crash_types(standings(self.project.results, self.failing))
+
     @property
     def work(self) -> str:
         """How much was read."""
@@ -170,6 +177,8 @@ class Dashboard:
         lines: list[str | Table] = [failing_sentence(self)]
         if words := requirements_sentence(self):
             lines.append(words)
+        if types := self.crash_types:
+            lines += [*map(types.sentence, types.drivers[:MOST_LINES]), types.limits]
         for mode in self.failing[:MOST_LINES]:
             status = "regression" if mode.is_regression else mode.status
             of = f"{mode.key.scenario}, {mode.key.driver}: {mode.title}"

@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from bridgegen.assess.criteria import margin_in_words
 from bridgegen.base.disk import write_whole
+from bridgegen.jobs.dashboard.crash_types import TypeStanding
 from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
 from bridgegen.jobs.dashboard.odd import Coverage, Covered
@@ -25,6 +26,7 @@ from bridgegen.pages.sentences import share
 from bridgegen.pages.templates import Banner, Cell, counted, joined, when
 from bridgegen.pages.thumbnails import Thumbnail, drawn, read_thumbnails
 from bridgegen.results.failures import FILE
+from bridgegen.scenario.typology import CrashType, most_harmful, named
 
 MOST_MODES = 300
 """Largest number of failure modes of a table; the others are counted."""
@@ -86,6 +88,7 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         verdict=banner(found) if served else replace(banner(found), command=_next(found)),
         file=FILE,
         verdicts=verdicts_table(found, base),
+        types=_types(found, base),
         histories=_histories(found),
         notes=found.notes[:MOST_RESULTS],
         modes=modes_table("Failure modes of current results", found.failing, base),
@@ -283,6 +286,46 @@ def _picture_of(found: Dashboard, standing: Standing) -> Thumbnail | None:
             if (picture.entry, picture.ego) == (result.entry, result.ego):
                 return picture
     return None
+
+
+def _types(found: Dashboard, base: str) -> dict[str, Any] | None:
+    """Return the matrix of types of crashes and drivers; None where few scenarios were tried."""
+    types = found.crash_types
+    if types is None:
+        return None
+    drivers = types.drivers[:MOST_DRIVERS]
+    rows = [
+        [
+            kind.name,
+            "not known" if kind.percent is None else share(kind.percent / 100),
+            *(_of_type(kind, each[driver], driver, base) for driver in drivers),
+        ]
+        for kind, each in types.lines
+    ]
+    heads = ("type of crash", "share of crashes", *drivers)
+    return {
+        "table": _table("Verdicts by type of crash and driver", heads, rows, kind="verdicts"),
+        "said": [types.sentence(driver) for driver in drivers],
+        "limits": types.limits,
+        "typology": types.typology,
+        "untried": [*map(named, most_harmful(types.untried))],
+    }
+
+
+def _of_type(kind: CrashType, standing: TypeStanding, driver: str, base: str) -> Cell:
+    text, worst = str(standing.verdict), standing.result
+    notes = [joined(standing.scenarios, 3)] if standing.scenarios else []
+    if standing.modes:
+        names = {mode.key.scenario for mode in standing.modes}
+        text = f"FAILS in {len(names)} of {counted(len(standing.scenarios), 'scenario')}"
+        severity = standing.modes[0].severity
+        notes += [f"worst MAIS3+ {share(severity)}"] if severity else []
+    elif standing.otherwise:
+        notes = [f"other failures alone in {joined(standing.otherwise, 3)}"]
+    mark = _MARKS[standing.verdict]
+    label = f"{driver}, {kind.name}: {text}"
+    href = _address(base, worst.page) if worst is not None else ""
+    return Cell(text, notes, kind=mark[1], href=href, label=label, mark=mark)
 
 
 # --- Failure modes: what fails now, what failed before ---
