@@ -137,6 +137,14 @@ class Dashboard:
         return crash_types(standings(self.project.results, self.failing))
 
     @property
+    def weighed(self) -> list[str]:
+        """In which types of crashes drivers fail, in words; nothing where few were tried."""
+        types = self.crash_types
+        if types is None:
+            return []
+        return [*map(types.sentence, types.drivers[:MOST_LINES]), types.limits]
+
+    @property
     def work(self) -> str:
         """How much was read."""
         return f"{sum(result.evaluations for result in self.project.results):,} evaluations"
@@ -177,8 +185,7 @@ class Dashboard:
         lines: list[str | Table] = [failing_sentence(self)]
         if words := requirements_sentence(self):
             lines.append(words)
-        if types := self.crash_types:
-            lines += [*map(types.sentence, types.drivers[:MOST_LINES]), types.limits]
+        lines += self.weighed
         for mode in self.failing[:MOST_LINES]:
             status = "regression" if mode.is_regression else mode.status
             of = f"{mode.key.scenario}, {mode.key.driver}: {mode.title}"

@@ -26,7 +26,7 @@ from bridgegen.pages.sentences import share
 from bridgegen.pages.templates import Banner, Cell, counted, joined, when
 from bridgegen.pages.thumbnails import Thumbnail, drawn, read_thumbnails
 from bridgegen.results.failures import FILE
-from bridgegen.scenario.typology import CrashType, most_harmful, named
+from bridgegen.scenario.typology import CrashType, most_harmful, named, shares
 
 MOST_MODES = 300
 """Largest number of failure modes of a table; the others are counted."""
@@ -296,13 +296,12 @@ def _types(found: Dashboard, base: str) -> dict[str, Any] | None:
     drivers = types.drivers[:MOST_DRIVERS]
     rows = [
         [
-            kind.name,
-            "not known" if kind.percent is None else share(kind.percent / 100),
+            (kind.name, shares([kind]).removeprefix(", with ")),
             *(_of_type(kind, each[driver], driver, base) for driver in drivers),
         ]
         for kind, each in types.lines
     ]
-    heads = ("type of crash", "share of crashes", *drivers)
+    heads = ("type of crash", *drivers)
     return {
         "table": _table("Verdicts by type of crash and driver", heads, rows, kind="verdicts"),
         "said": [types.sentence(driver) for driver in drivers],
