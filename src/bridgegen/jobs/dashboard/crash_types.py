@@ -40,7 +40,7 @@ class TypeStanding:
         verdict: "not judged" also where its scenarios fail, but in other conflicts alone.
         modes: of the type's kind, that fail now, the gravest first.
         scenarios: that were tried.
-        otherwise: those that fail, but in other conflicts alone.
+        otherwise: those that fail, but in other conflicts or in random draws alone.
         result: the one that a reader looks at first; None where nothing was tried.
     """
 
@@ -122,7 +122,9 @@ def _standing(
     modes = sorted(
         (mode for some in own.values() for mode in some), key=lambda mode: -mode.severity
     )
-    otherwise = tuple(name for name, standing in found.items() if standing.modes and not own[name])
+    otherwise = tuple(
+        name for name, standing in found.items() if standing.verdict == "fails" and not own[name]
+    )
     verdicts = {standing.verdict for standing in found.values()}
     verdict: Verdict = "never tried"
     if modes:

@@ -22,8 +22,9 @@ from bridgegen.jobs.dashboard.odd import Coverage, coverage
 from bridgegen.jobs.dashboard.options import DashboardOptions
 from bridgegen.jobs.dashboard.project import Project, read_project
 from bridgegen.jobs.dashboard.requirements import Matrix, matrices
+from bridgegen.jobs.dashboard.results import Result, current
 from bridgegen.jobs.dashboard.trends import Series, trends
-from bridgegen.jobs.dashboard.verdicts import standings
+from bridgegen.jobs.dashboard.verdicts import is_rare, standings
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.results.failures import (
     FILE,
@@ -77,6 +78,11 @@ class Dashboard:
     def failing(self) -> tuple[OpenMode, ...]:
         """The failure modes that current results have."""
         return tuple(mode for mode in self.modes if mode.fails_now)
+
+    @cached_property
+    def rare(self) -> tuple[Result, ...]:
+        """The current results that fail in fresh random draws alone."""
+        return tuple(filter(is_rare, current(self.project.results)))
 
     @cached_property
     def regressions(self) -> tuple[OpenMode, ...]:
