@@ -180,7 +180,7 @@ def search(
     scenario: Annotated[
         str,
         typer.Argument(
-            help="A catalogue name, or the path of a YAML or an OpenSCENARIO file; or a run file.",
+            help="A catalogue name; or a YAML, OpenSCENARIO or run file.",
             show_default=False,
             autocompletion=completing("scenario"),
         ),
@@ -189,8 +189,7 @@ def search(
         bool,
         typer.Option(
             "--catalogue",
-            help="Search all scenarios of the catalogue in place of one; --out/dashboard.html "
-            "weighs where the driver fails by how common such crashes are.",
+            help="Search all scenarios that ship; one page weighs the failures.",
             rich_help_panel=WHAT,
         ),
     ] = False,
