@@ -6,7 +6,7 @@ from dataclasses import replace
 import bridgegen as bg
 from bridgegen.jobs.dashboard.crash_types import FEWEST, crash_types
 from bridgegen.jobs.dashboard.modes import Decisions, failure_modes
-from bridgegen.jobs.dashboard.page import write_page
+from bridgegen.jobs.dashboard.page import banner, write_page
 from bridgegen.jobs.dashboard.verdicts import standings
 from bridgegen.search.triage.record import Estimate
 
@@ -58,10 +58,12 @@ def test_few_scenarios_are_no_typology(result):
 def test_random_draws_that_fail_are_no_all_clear(project, result, tmp_path):
     found = bg.build_dashboard(project, out=tmp_path / "a.html")
     assert 'id="types"' not in found.page.read_text("utf-8")
-    project = replace(found.project, runs=(result("bus-pulls-out", space=RARE),), suites=())
-    write_page(replace(found, modes=(), requirements=(), project=project))
+    runs = (result("bus-pulls-out", space=RARE),)
+    project = replace(found.project, runs=runs, suites=(), problems=())
+    found = replace(found, modes=(), requirements=(), project=project)
+    assert (banner(found).kind, banner(found).word) == ("fails", "FAILS")
+    write_page(found)
     text = found.page.read_text("utf-8")
-    assert "NO FAILURE FOUND" not in text
     assert "FAILS rarely" in text
     assert "1 of 256 random draws" in text
     assert "In bus-pulls-out, random draws alone fail." in text
@@ -71,9 +73,10 @@ def test_the_page_weighs_by_type_and_says_what_a_share_is_not(project, result, t
     found = bg.build_dashboard(project, out=tmp_path / "a.html")
     some = results_of(result)
     modes = tuple(failure_modes(some, Decisions({})))
-    write_page(
-        replace(found, modes=modes, project=replace(found.project, runs=tuple(some), suites=()))
-    )
+    project = replace(found.project, runs=tuple(some), suites=())
+    found = replace(found, modes=modes, project=project)
+    assert "stack fails in 1 of 4 types of crashes" in banner(found).text
+    write_page(found)
     text = found.page.read_text("utf-8")
     section = re.search(r'<section id="types">.*?</section>', text, re.DOTALL)[0]
     words = " ".join(re.sub(r"<[^>]*>", " ", section).split())
