@@ -2,6 +2,7 @@
 
 python -m benchmarks.bits            # compare with those published; 10 to 15 minutes
 python -m benchmarks.bits --write    # after a change of results that CHANGELOG names
+python -m benchmarks.bits --verdicts # the same, of digests with verdicts alone: a minute
 python -m benchmarks.bits --pages    # of runs' rows, as their reports simulate them; 10 minutes
 """
 
@@ -19,10 +20,16 @@ from bridgegen.scenario.language.reader import names
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="publish this machine's digests")
+    parser.add_argument("--verdicts", action="store_true", help="publish those with verdicts alone")
     parser.add_argument("--pages", nargs="*", help="compare what reports simulate, of some")
     options = parser.parse_args()
     if options.pages is not None:
         bits_pages.main(options.pages)
+        return
+    path = Path(conformance.__file__).with_name("conformance.json")
+    if options.verdicts:
+        published = conformance.published() | {"verdicts": conformance.verdict_digests()}
+        path.write_text(json.dumps(published, indent=1) + "\n", encoding="utf-8")
         return
     write = options.write
     known = {} if write else conformance.published()["rows"]
@@ -38,8 +45,9 @@ def main() -> None:
             same = "" if write else "same" if found[key] == known.get(key) else "DIFFERS"
             print(f"{key}: {found[key]} {same}", flush=True)
     if write:
-        text = json.dumps({"functions": conformance.function_digests(), "rows": found}, indent=1)
-        path = Path(conformance.__file__).with_name("conformance.json")
+        functions, verdicts = conformance.function_digests(), conformance.verdict_digests()
+        all_of_them = {"functions": functions, "rows": found, "verdicts": verdicts}
+        text = json.dumps(all_of_them, indent=1)
         path.write_text(text + "\n", encoding="utf-8")
 
 

@@ -97,6 +97,7 @@ def _same_everywhere(text: str, config: Any) -> str:
     text = re.sub(r"(\.py(?::|, line |\", line ))\d+", r"\1<line>", text)
     text = re.sub(r"\b(?:Input|String|List) should [\w ]+(?:, unable [\w ]+)?", "<pydantic>", text)
     text = re.sub(r"(127\.0\.0\.1:|localhost:|\bport )\d{4,5}\b", r"\1<port>", text)
+    text = re.sub(r"\b[0-9a-f]{64}\b", "<sha256>", text)
     text = re.sub(r"\(\d+ s\)", "(<duration>)", text)
     text = re.sub(r"\b[\d,]+ scenarios/s\b", "<rate> scenarios/s", text)
     text = re.sub(r"\bstopped after [\d,]+ of\b", "stopped after <some> of", text)

@@ -4,6 +4,7 @@ import json
 import shlex
 import sys
 from dataclasses import fields
+from pathlib import Path
 
 import jsonschema
 import pytest
@@ -60,6 +61,8 @@ VALUES = {
     ),
 }
 OTHERS = st.none() | NAMES | TEXTS.map(lambda text: f"x{text}".strip())
+ODD = Path(__file__).parents[1] / "docs/examples/motorway-odd.yaml"
+VALUES["odd"] = st.sampled_from([None, ODD])
 OPTIONS = st.builds(
     SearchOptions,
     **{

@@ -30,7 +30,7 @@ GIVEN = {
     "suite": {
         "files": ("cut-in", "packs"), "egos": ("careful", "exec:python3 my,driver.py"),
         "matrix": "2026", "samples": 3, "seed": 4, "simulator": SimulatorChoice("esmini"),
-        "driver_name": "planner 7", "with_maps": True,
+        "driver_name": "planner 7", "with_maps": True, "assessor": Path("/keys/a.key"),
     },
     "diff": {
         "files": ("cut-in",), "egos": ("careful", "reference"), "matrix": "none", "samples": 3,
@@ -40,7 +40,7 @@ GIVEN = {
         "folder": Path("project"), "criteria": ["R-1: min(ego.v) < 3 m/s"], "update": True,
     },
     "safety-case": {"runs": (Path("/runs/a"), Path("/runs/b"))},
-    "credibility": {"runs": (Path("/runs/a"), Path("/runs/b"))},
+    "credibility": {"runs": (Path("/runs/a"), Path("/runs/b")), "validate": True},
     "mine": {
         "recordings": (Path("/recorded/a.csv"),), "road_map": Path("/recorded/a.xodr"),
         "time_step": 0.1, "scenarios": (Path("/mine/a.yaml"),),
@@ -142,6 +142,12 @@ def first_of(job):
     return next((one.name for one in options_of(job.options) if one.is_argument), "")
 
 
+def needed_by(job):
+    """Values of what a run file of a job must have: its argument, and what has no default."""
+    names = [one.name for one in options_of(job.options) if one.is_required or one.is_argument]
+    return {name: GIVEN[job.name][name] for name in names}
+
+
 jobs = pytest.mark.parametrize("job", JOBS, ids=lambda job: job.name)
 of_files = pytest.mark.parametrize(
     "job", [one for one in JOBS if first_of(one)], ids=lambda job: job.name
@@ -184,10 +190,7 @@ def test_a_run_file_has_the_options_of_the_call_that_saved_it(job, asked, monkey
 def test_a_file_of_several_runs_makes_each_in_a_folder_of_its_own(
     job, asked, monkeypatch, tmp_path, capsys
 ):
-    needed = {
-        one.name: GIVEN[job.name][one.name] for one in options_of(job.options) if one.is_required
-    }
-    needed = in_file(job, needed)
+    needed = in_file(job, needed_by(job))
     file = tmp_path / "both.yaml"
     file.write_text(json.dumps({"runs": {"a": needed, "b": needed}}))
     assert call(monkeypatch, *job.name.split(), file) == 0
@@ -204,9 +207,7 @@ def test_a_file_of_several_runs_makes_each_in_a_folder_of_its_own(
 
 @of_files
 def test_one_run_that_fails_does_not_keep_the_others(job, asked, monkeypatch, tmp_path, capsys):
-    required = [one.name for one in options_of(job.options) if one.is_required]
-    needed = {name: GIVEN[job.name][name] for name in required}
-    needed = in_file(job, needed)
+    needed = in_file(job, needed_by(job))
     file, run = tmp_path / "both.yaml", Job.run
 
     called = []

@@ -130,7 +130,7 @@ def shortened(words: list[str], is_triaged: bool = False) -> list[str]:
     for option, value in FEW.get(words[1], {}).items():
         if option in found:
             found[found.index(option) + 1] = value
-    is_subcommand = words[1:3] in (["suite", "add"], ["suite", "replay"])
+    is_subcommand = words[1] == "suite" and words[2] in ("add", "replay", "commit", "verify")
     coarse = COARSE.get("" if is_subcommand else words[1], {})
     for option, value in (
         {"--size": "320x180", "--fps": "4"} if "video" in words else coarse

@@ -1,6 +1,7 @@
 """Each rule of responsibility in a rollout that shows it, and in its counter-case."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -143,6 +144,54 @@ def test_an_obstacle_that_is_revealed_too_late_is_nobodys(track, meeting, course
     assert verdict(late) == (NEITHER, Rule.REVEALED_LATE)
     early = meeting(track(v=20.0), track(x=100.0), {**van, "y": np.full(121, 8.0)})
     assert verdict(early) == (EGO, Rule.STANDING_AHEAD)
+
+
+def excused_up_to(faulty, least, most):
+    """The value from which on the ego, excused at ``least``, is at fault; by bisection."""
+    assert faulty(most)
+    assert not faulty(least)
+    for _ in range(12):
+        middle = 0.5 * (least + most)
+        least, most = (least, middle) if faulty(middle) else (middle, most)
+    return least
+
+
+LATER = np.arange(0.0, DT, 0.007)
+"""Shifts of the instants at which a motion is sampled, within a step [s]."""
+
+
+def test_what_is_revealed_late_does_not_depend_on_where_the_samples_fall(track, meeting):
+    """A van that hides an obstacle leaves the lane at 0.3 s; the distance that suffices.
+
+    At 20 m/s a step is 1 m; at whole steps the distances differed by as much.
+    """
+
+    def met(distance, later):
+        van = track(x=10.0 + 20.0 * later, v=20.0)
+        aside = 8.0 * np.maximum(DT * np.arange(121) + later - 0.3, 0.0)
+        obstacle = track(x=distance)
+        return at_fault(meeting(track(x=20.0 * later, v=20.0), obstacle, {**van, "y": aside}))
+
+    needed = [excused_up_to(partial(met, later=later), 30.0, 90.0) for later in LATER]
+    assert max(needed) - min(needed) < 0.1
+
+
+def test_who_steps_out_does_not_depend_on_where_the_samples_fall(track, meeting):
+    """A pedestrian, on a crosswalk for 2.3 s before an ego comes, stands still; the pace it needs.
+
+    At whole steps the paces differed by 0.1 s of 2.3 s.
+    """
+    walk = np.array([[[0.0, 0.0, 0.0, 2.0, 6.0]]])
+
+    def met(pace, later):  # in s/m
+        ego = track(x=-2.0 - (4.0 - later) / pace, v=1.0 / pace)
+        y = 3.0 * np.minimum(DT * np.arange(121) - 4.0 + later, 0.0)
+        walker = {**track(h=RIGHT_ANGLE, v=np.where(y < 0.0, 3.0, 0.0)), "x": np.zeros(121), "y": y}
+        boxes = [(4.0, 2.0, 0.0), MAN]
+        return at_fault(meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=boxes, crosswalks=walk))
+
+    needed = [excused_up_to(partial(met, later=later), 1.0 / 25.0, 1.0 / 8.0) for later in LATER]
+    assert max(needed) / min(needed) - 1.0 < 0.002
 
 
 def wrong_way(track, meeting, v, stands, **more):

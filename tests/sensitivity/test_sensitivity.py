@@ -16,7 +16,8 @@ from bridgegen.cli import app
 from bridgegen.engine.constants import try_with
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.jobs.search.sensitivity import PAGE, _write_page, sensitivity_of, shares
+from bridgegen.jobs.search.report import SENSITIVITY
+from bridgegen.jobs.search.sensitivity import _write_page, sensitivity_of, shares
 from bridgegen.scenario.language.reader import load
 from bridgegen.search.sensitivity import JSON_FILE, read_record
 
@@ -76,7 +77,11 @@ def test_where_no_verdict_hangs_on_a_constant_nothing_is_said(tmp_path):
         for finding in record.findings
         for effect in finding.effects
     )
-    assert "No verdict on 3 findings hangs on one constant alone." in (folder / PAGE).read_text()
+    assert (
+        "No verdict on 3 findings hangs on one constant alone."
+        in (folder / SENSITIVITY).read_text()
+    )
+    assert f'"beside":["{SENSITIVITY}"]' in (folder / "report.html").read_text("utf-8")
 
 
 def test_the_same_seed_gives_the_same_bytes(cut_out, tmp_path):
@@ -84,7 +89,7 @@ def test_the_same_seed_gives_the_same_bytes(cut_out, tmp_path):
     shutil.copytree(cut_out, other)
     sensitivity_of(cut_out, **FEW)
     sensitivity_of(other, **FEW)
-    for name in (JSON_FILE, PAGE):
+    for name in (JSON_FILE, SENSITIVITY):
         assert (cut_out / name).read_bytes() == (other / name).read_bytes()
     once = json.loads((other / JSON_FILE).read_text())
     sensitivity_of(other, **FEW, seed=7)
@@ -180,8 +185,8 @@ def test_a_driver_in_python_has_to_be_named_and_is_evaluated(tmp_path):
 def test_texts_of_strangers_are_escaped_on_the_page(found, tmp_path):
     bad = "<img src=x onerror=alert(1)>"
     first = found.findings[0].model_copy(update={"title": bad, "sentences": (bad,)})
-    _write_page(tmp_path / PAGE, found.model_copy(update={"ego": bad, "findings": (first,)}))
-    text = (tmp_path / PAGE).read_text()
+    _write_page(tmp_path / SENSITIVITY, found.model_copy(update={"ego": bad, "findings": (first,)}))
+    text = (tmp_path / SENSITIVITY).read_text()
     assert "<img" not in text
     assert "&lt;img" in text
     assert text.count("<script") == 1

@@ -94,7 +94,8 @@ def _annotation(option: Option) -> Any:
     kind = option.form.kind
     if option.is_argument:
         return Annotated[
-            kind, typer.Argument(help=option.help, autocompletion=completing(option.names))
+            kind if option.is_required else kind | None,
+            typer.Argument(help=option.help, autocompletion=completing(option.names)),
         ]
     return Annotated[kind if kind is bool else kind | None, declare(option)]
 
@@ -116,6 +117,6 @@ def declare(option: Option) -> Any:
 
 def _default(option: Option) -> Any:
     """Return the parser's default; None where only the options' class knows it."""
-    if option.is_argument:
+    if option.is_argument and option.is_required:
         return inspect.Parameter.empty
     return option.default if isinstance(option.default, bool | int | float | str) else None

@@ -465,6 +465,19 @@ def fit(
             "uniform, an example's name, or a file."
         ),
     ] = None,
+    recordings: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Recorded traffic, file or folder: replay its events beside their parameterised "
+            "twins, and count the verdicts that change; may be repeated."
+        ),
+    ] = None,
+    road_map: Annotated[
+        Path | None, typer.Option("--map", help="OpenDRIVE map of the recordings.")
+    ] = None,
+    replay_drivers: Annotated[
+        str, typer.Option(help="Drivers that ship and drive in both, by commas; or none.")
+    ] = "reference,un-r157",
     replicates: Annotated[int, typer.Option(help="Resampled fits, for bands and p values.")] = 200,
     seed: Annotated[int, typer.Option(help="Seed of the random number generator.")] = 0,
     as_json: options.Json = False,
@@ -482,8 +495,9 @@ def fit(
         fitted, written = write_fit(
             scenario, events, out=out, page=page, xosc=xosc, hours=hours, km=km,
             ignore=ignore or (), others=without_column, source=source, prior=prior,
-            replicates=replicates,
-            seed=seed, progress=live.progress, notes=notes,
+            recordings=recordings or (), road_map=road_map, replay_drivers=replay_drivers,
+            replicates=replicates, seed=seed, progress=live.progress, replayed=live.replayed,
+            notes=notes,
         )  # fmt: skip
     for note in notes:
         print(f"bridgegen: note: {note}", file=sys.stderr)

@@ -65,29 +65,13 @@ def _typologies(scenarios: Sequence[str]) -> Listed:
     rows = []
     for each in typologies().values():
         of_it = {name for kind in each.types for name in kind.scenarios}
-        rows.append(
-            (
-                each.title,
-                said(each),
-                "; ".join(map(named, each.uncovered)),
-                # Of a typology of some crashes only, it says nothing that most are in none.
-                ", ".join(sorted(set(scenarios) - of_it))
-                if len(of_it) > len(scenarios) / 2
-                else "",
-                each.counts,
-                each.source,
-                each.known,
-            )
-        )
-    head = (
-        "description",
-        "not covered",
-        "in none of these types",
-        "shares of",
-        "source",
-        "figures",
-    )
-    return ("typology", *head), rows
+        # Of a typology of some crashes only, it says nothing that most scenarios are in none.
+        rest = sorted(set(scenarios) - of_it) if len(of_it) > len(scenarios) / 2 else []
+        left = "; ".join(map(named, each.uncovered))
+        facts = (each.counts, each.source, each.known)
+        rows.append((each.title, said(each), left, ", ".join(rest), *facts))
+    head = ("description", "not covered", "in none of these types", "shares of", "source")
+    return ("typology", *head, "figures"), rows
 
 
 @_of("packs")

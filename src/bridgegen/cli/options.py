@@ -94,6 +94,7 @@ ScreenSettings = Annotated[
 SimulatorSettings = Annotated[
     list[str] | None, _text("--simulator-set", _SETTING.format("simulator"), SIMULATOR)
 ]
+Odd = Annotated[Path | None, declaration("odd")]
 RoadMap = Annotated[Path | None, declaration("road_map")]
 Junction = Annotated[str | None, declaration("junction")]
 Workers = Annotated[

@@ -1,4 +1,4 @@
-"""The commands of a suite that grows: ``suite add``, and ``suite replay`` of one variation."""
+"""The commands beside ``suite``: ``add``, ``replay``, and an assessor's ``commit``, ``verify``."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,10 +15,19 @@ from bridgegen.cli.connection import (
     with_connection_options,
     with_map_folder,
 )
-from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
+from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, WHAT
 
 Results = Annotated[
     Path, typer.Argument(metavar="FOLDER", help="Folder of a suite's results, suites/NAME.")
+]
+
+Files = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="SUITE...",
+        help="The suite's scenarios: folders, files, names.",
+        autocompletion=completing("suite"),
+    ),
 ]
 
 
@@ -112,3 +121,46 @@ def replay(
     print_replayed(made, page, as_json=as_json)
     if not (made.is_same and made.is_same_exported):
         raise typer.Exit(FAILED)
+
+
+@suites.command("commit")
+@with_map_folder(WHAT)
+def commit(
+    files: Files,
+    key: Annotated[Path, typer.Option(help="New file of the key.", rich_help_panel=OUTPUT)],
+    number: Annotated[
+        int, typer.Option(help="Variations of each scenario.", rich_help_panel=SEARCH)
+    ] = 200,
+) -> None:
+    """Make an assessor's key, and print the hash to publish.
+
+    Publish it before the driver is handed in. 'suite ... --assessor KEY' draws the variations of
+    that key, once, and seals the result.
+    """
+    from bridgegen.jobs.suite.sealed import commit as lines_of
+
+    print("\n".join(lines_of(key, files, number)))
+
+
+@suites.command("verify")
+@with_map_folder(WHAT)
+def verify(
+    sealed: Annotated[Path, typer.Argument(help="The sealed result, sealed.json.")],
+    files: Files,
+    published: Annotated[
+        list[str] | None,
+        typer.Option(help="Published hash of the key, or seal.", rich_help_panel=WHAT),
+    ] = None,
+    ego: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Run it again with this driver; with a mended one, a re-test.",
+            rich_help_panel=DRIVER,
+            autocompletion=completing("driver"),
+        ),
+    ] = None,
+) -> None:
+    """Verify a sealed result; with --ego, run it again."""
+    from bridgegen.jobs.suite.sealed import verify as lines_of
+
+    print("\n".join(lines_of(sealed, files, published or (), ego or ())))

@@ -86,8 +86,8 @@ def coverage(
     from bridgegen.cli.terminal.search import print_coverage
     from bridgegen.jobs.search.coverage import coverage_of
 
-    settings, found = coverage_of(run, bins=bins, strength=strength, exposure=exposure)
-    print_coverage(run, settings, found, as_json=as_json)
+    settings, found, of_odd = coverage_of(run, bins=bins, strength=strength, exposure=exposure)
+    print_coverage(run, settings, found, of_odd, as_json=as_json)
 
 
 @analyses.command()

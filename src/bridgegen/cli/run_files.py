@@ -382,7 +382,8 @@ def with_run_files(
                 return
             save = values.pop(SAVE)
             given.pop(SAVE, None)
-            first = values[argument][0] if isinstance(values[argument], list) else values[argument]
+            named = values[argument] or ""  # a job may take none
+            first = named[0] if isinstance(named, list) else named
             path, filed = Path(first), is_run_file(first)
             runs = [FiledRun("", given)]
             if filed:

@@ -90,14 +90,8 @@ def search_catalogue(
         get(ego)  # one error, and not one for each scenario
         driver = folder_word(ego)
     out = Path(given.pop("out", None) or Path("runs") / f"catalogue-{driver}")
-    words = ["--catalogue"]
-    for spelling, key in keys.items():
-        value = given.get(key.name, [])
-        for each in value if isinstance(value, list) else [value]:
-            flag = "no-" * (each is False) + spelling
-            words += [f"--{flag}"] if isinstance(each, bool) else [f"--{spelling}", str(each)]
     runs = [FiledRun(name, {**given, SCENARIO: name, "out": out / name}) for name in names()]
-    status = _search_each(out, runs, keys, command, shlex.join([*words, "--out", str(out)]))
+    status = _search_each(out, runs, keys, command, shlex.join(sys.argv[2:]))
     if any((out / run.name / DATABASE).is_file() for run in runs):
         found = build_dashboard(out)
         print()
@@ -322,6 +316,7 @@ def simulate(
     ],
     fix: common.Fix = None,
     distribution: common.Distribution = None,
+    odd: common.Odd = None,
     road_map: common.RoadMap = None,
     junction: common.Junction = None,
     objective: common.Objective = None,
@@ -377,7 +372,7 @@ def simulate(
     skipped: list[str] | None = [] if lenient else None
     file, runs = Path(scenario), common.read_simulator(simulator, simulator_set, connection)
     is_logical = file.suffix.lower() in (".yaml", ".yml") or not (file.suffix or file.exists())
-    if is_logical or fix or distribution:
+    if is_logical or fix or distribution or odd:
         from bridgegen.jobs.search.model import simulate_scenario  # takes longer than a file
 
         if dt is not None or lenient:
@@ -385,7 +380,7 @@ def simulate(
         options = CommonOptions(
             ego=ego, ideal=stages or (), vehicle=vehicle, others=others, time_limit=time_limit,
             empty_trigger=empty_trigger, fixed=read_fixed(fix, "--fix"), distribution=distribution,
-            road_map=road_map, junction=junction, critical=critical,
+            odd=odd, road_map=road_map, junction=junction, critical=critical,
             objective=read_terms(objective, "--objective"), metrics=read_names(metrics),
             criteria=[one.to_dict() for one in criteria.criteria],
         )  # fmt: skip

@@ -7,18 +7,26 @@ from importlib.resources import files
 
 import numpy as np
 
+from bridgegen.assess.conflict.analysis import analyse
 from bridgegen.base import elementary
 from bridgegen.base._elementary_kernels import FUNCTIONS
+from bridgegen.base.errors import InputError
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads
-from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.reader import load, names
 
 DRIVERS = ("route-follower", "reference", "careful", "un-r157")
 """Drivers whose rows have a published digest, in each scenario of the catalogue."""
 
+SHIPPED = (*DRIVERS, "fsm", "careful-fsm")
+"""Drivers whose verdicts have one."""
+
 ROWS, BLOCK = 10_000, 500
 """Number of rows of a digest, and of those that are held at once."""
+
+SAMPLE = 60
+"""Number of rows of a digest with verdicts, of which each driver that ships has one."""
 
 QUICK = ("crossroads-s4", "route-follower")
 """Scenario and driver whose rows `differences` compares: a second, once they are compiled."""
@@ -31,13 +39,14 @@ def function_digests() -> dict[str, str]:
     return {name: _digest([getattr(elementary, name)(x, y)]) for name in FUNCTIONS}
 
 
-def rows_digest(scenario: str, driver: str, rows: int = ROWS) -> str:
+def rows_digest(scenario: str, driver: str, rows: int = ROWS, *, verdicts: bool = False) -> str:
     """Return the digest of the motion and the metrics of random rows of a scenario.
 
     Args:
         scenario: of the catalogue, or a path.
         driver: the ego's.
         rows: how many are drawn; those that the scenario's rules refuse do not count.
+        verdicts: include all that is said of conflicts, but harm.
 
     Raises:
         InputError: no such scenario or driver, or the driver does not drive there.
@@ -53,12 +62,36 @@ def rows_digest(scenario: str, driver: str, rows: int = ROWS) -> str:
             rollout = pipeline.runner.run(X[first : first + BLOCK])
             yield from (rollout.x, rollout.y, rollout.h, rollout.v, rollout.a)
             yield from (rollout.n_steps, rollout.status, pipeline.measure(rollout))
+            if verdicts:
+                found = analyse(rollout)
+                yield from (found.kind, found.type, found.responsible, found.rule)
+                yield from (found.instant, found.decided, found.preventable, found.at_fault)
+                yield found.severity  # not harm: it takes a logarithm of the system's
 
     return _digest(arrays())
 
 
+def verdict_digests(drivers: Iterable[str] = SHIPPED) -> dict[str, str]:
+    """Return the digests of `SAMPLE` rows with verdicts, by scenario of the catalogue and driver.
+
+    "" where the driver does not drive.
+    """
+    found = {}
+    for driver in drivers:
+        for scenario in names():
+            try:
+                digest = rows_digest(scenario, driver, SAMPLE, verdicts=True)
+            except InputError:
+                digest = ""
+            found[f"{scenario} {driver}"] = digest
+    return found
+
+
 def published() -> dict[str, dict[str, str]]:
-    """Return the published digests: "functions" by name, "rows" by scenario and driver."""
+    """Return the published digests.
+
+    "functions" by name; "rows" and, of `SAMPLE` rows, "verdicts" by scenario and driver.
+    """
     text = (files("bridgegen.engine") / "conformance.json").read_text("utf-8")
     found: dict[str, dict[str, str]] = json.loads(text)
     return found

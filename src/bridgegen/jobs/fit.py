@@ -14,6 +14,8 @@ from bridgegen.scenario.exposure.reader import refuse_other_file, write_exposure
 from bridgegen.scenario.language.reader import load
 
 _OTHERS = ("uniform", "default")
+REPLAY_DRIVERS = "reference,un-r157"
+"""Drivers that replay recorded events by default."""
 
 
 def write_fit(
@@ -29,9 +31,13 @@ def write_fit(
     others: str | None = None,
     source: str | None = None,
     prior: str | None = None,
+    recordings: Sequence[Path] = (),
+    road_map: Path | None = None,
+    replay_drivers: str = REPLAY_DRIVERS,
     replicates: int = 200,
     seed: int = 0,
     progress: Progress | None = None,
+    replayed: Progress | None = None,
     notes: list[str] | None = None,
 ) -> tuple[Fit, tuple[Path, ...]]:
     """Fit a scenario's exposure to events, and write it, its page and its distribution.
@@ -48,9 +54,14 @@ def write_fit(
         others: likewise.
         source: likewise.
         prior: likewise.
-        replicates: likewise.
+        recordings: files or folders; their events of this scenario are replayed beside their
+            parameterised twins.
+        road_map: of the recordings, see `bridgegen.recordings.twins.twins_of`.
+        replay_drivers: names of drivers that ship, separated by commas; "none": no replays.
+        replicates: see `fit_exposure`.
         seed: likewise.
         progress: likewise.
+        replayed: is told how many of how many batches of replays are done.
         notes: takes what the OpenSCENARIO file leaves out, a sentence each.
 
     Returns:
@@ -67,8 +78,17 @@ def write_fit(
     refuse_other_page(page)
     if xosc is not None and xosc.exists():
         raise StorageError(f"{xosc}: exists already, and is not overwritten")
+    logical, drivers = load(scenario), replay_drivers.split(",")
+    twins = None
+    if recordings and replay_drivers != "none":
+        if not out.parent.is_dir():  # minutes of replays must not be lost
+            raise StorageError(f"{out}: there is no folder {out.parent}")
+        # Late, because it compiles: a fit without recordings simulates nothing.
+        from bridgegen.recordings.twins import twins_of
+
+        twins = twins_of(logical, recordings, drivers, road_map, replayed)
     made = fit_exposure(
-        load(scenario),
+        logical,
         events,
         hours=hours,
         km=km,
@@ -76,6 +96,7 @@ def write_fit(
         others=cast(Literal["uniform", "default"] | None, others),
         source=source,
         prior=prior,
+        parameterisation=twins,
         replicates=replicates,
         seed=seed,
         progress=progress,

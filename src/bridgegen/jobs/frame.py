@@ -19,6 +19,7 @@ from bridgegen.base.errors import InputError
 from bridgegen.engine.options import file_forms, options_of
 from bridgegen.engine.options.forms import PATH, Form, read_names
 from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, WHAT, Declared, option
+from bridgegen.engine.options.search import OF_ODD
 
 
 class Table(NamedTuple):
@@ -113,7 +114,7 @@ class JobCallbacks:
 
 @dataclass(frozen=True, kw_only=True)
 class DriveOptions(Declared):
-    """How the ego moves, and who drives the others."""
+    """How the ego moves, who drives the others, and what bounds the scenario."""
 
     vehicle: str | None = field(
         default=None,
@@ -136,6 +137,7 @@ class DriveOptions(Declared):
             names="others",
         ),
     )
+    odd: Mapping[str, Any] | Path | str | None = field(default=None, metadata=OF_ODD)
 
 
 @dataclass(frozen=True, kw_only=True)

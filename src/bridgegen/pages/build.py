@@ -85,6 +85,7 @@ def build_report(
     drawn: Mapping[str, Float] | None = None,
     further_files: Sequence[str] = (),
     happening: Happening | None = None,
+    beside: tuple[str, ...] = (),
 ) -> ReportData:
     """Return all that the page shows.
 
@@ -113,6 +114,7 @@ def build_report(
         more: whether the page includes the motion of more scenarios than ``kept``.
         triage: failure modes and bound of the run, if they are known.
         drawn: failing fresh random draws, the worst first, by name.
+        beside: pages of other analyses, files of the run's folder.
         further_files: of these and of the minimal scenarios, by their paths relative to the page.
         happening: which events began, and who came near the ego, if it is known.
     """
@@ -155,7 +157,9 @@ def build_report(
         harm=pipeline.objective.harm if rule != "thresholds" else "",
         criteria=pipeline.objective.criteria,
         hashes=hashes,
+        odd="" if scenario.odd is None else scenario.odd.label,
         settings={
+            **({} if scenario.odd is None else scenario.odd.facts),
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
             **wanted,
             "simulated": f"{embedded.duration:g} s at {embedded.time_step:g} s",
@@ -193,6 +197,7 @@ def build_report(
         criteria=judged,
         screened=screened_payload(notes, pipeline.space),
         happening=happening,
+        beside=beside,
         simulation=simulation_payload(pipeline, simulated) if coverage else None,
     )
 

@@ -62,6 +62,8 @@ class RunSummary:
         criteria: names of the margins that make a scenario critical, where pass criteria do.
         hashes: of the run's inputs and results, name → digest.
         settings: further settings, name → text, in display order.
+        odd: the operational design domain that bounds it, and how much of that is not judged; ""
+            without one.
     """
 
     scenario: str
@@ -96,6 +98,7 @@ class RunSummary:
     baseline: str = ""
     hashes: Mapping[str, str] | None = None
     settings: Mapping[str, str] | None = None
+    odd: str = ""
 
 
 WHOLE = ("d_min", "v_d", "n_collision", "harm", "harm_any", "severity")
@@ -262,6 +265,7 @@ class ReportData:
         screened: how far the run's screen agrees, as `screened_payload` returns it.
         happening: which events began, and who came near the ego, if the run recorded it.
         simulation: what the page simulates with; see `simulation_payload`. None: it does not.
+        beside: pages of other analyses of the run, files of its folder.
         alone: whether the page is about its only exported scenario, see `only`.
     """
 
@@ -281,6 +285,7 @@ class ReportData:
     screened: Mapping[str, Any] | None = None
     happening: Happening | None = None
     simulation: Mapping[str, Any] | None = None
+    beside: tuple[str, ...] = ()
     alone: bool = False
 
     def __post_init__(self) -> None:

@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.base.disk import refuse_other
+from bridgegen.base.units import percent
 from bridgegen.pages import templates
 from bridgegen.pages.charts import Plot
 from bridgegen.scenario.exposure.fit import Fit, ParameterFit
+from bridgegen.scenario.language.parameterisation import ELEMENTS, Parameterisation
 
 GENERATOR = "BridgeGen fit"
 DOUBTFUL = 0.05
@@ -53,7 +55,37 @@ def write_page(path: Path, fit: Fit, exposure: Path | None = None) -> None:
         correlated=fit.correlated,
         correlation=fit.correlation.tolist(),
         band=fit.correlation_band.tolist(),
+        says=fit.exposure.left_out,
+        twins=_twins(fit.exposure.parameterisation),
     )
+
+
+def _twins(found: Parameterisation | None) -> dict[str, object]:
+    """Return the verdicts of recorded events and of their parameterised twins as tables."""
+    if found is None:
+        return {"rows": []}
+    rows = [
+        [verdict, driver, *one.model_dump().values(), *map(_interval, one.shares().values())]
+        for verdict, of in found.agreement.items()
+        for driver, one in of.items()
+    ]
+    back = [
+        [verdict, one.replay + one.twin, *(of.get(element, "–") for element in ELEMENTS)]
+        for verdict, of in found.given_back.items()
+        for one in [found.pooled(verdict)]
+    ]
+    return {
+        "source": found.source,
+        "left_out": "; ".join(f"{n} {reason}" for reason, n in found.left_out.items()),
+        "rows": rows,
+        "elements": ELEMENTS,
+        "back": back,
+    }
+
+
+def _interval(share: tuple[float, float, float] | None) -> tuple[str, str]:
+    value, low, high = map(percent, share) if share else ("–", "", "")
+    return value, f"{low} to {high}" if share else ""
 
 
 def _banner(fit: Fit, exposure: Path | None) -> templates.Banner:

@@ -98,6 +98,7 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         ],
         "steps": steps_in_words(found),
         "missed": found.missed,
+        "extrapolated": found.extrapolated,
         "judged": _judged(found),
         "bound": {
             "sentence": found.bound.in_full,

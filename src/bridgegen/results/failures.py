@@ -46,7 +46,7 @@ _Text = Annotated[str, Field(max_length=MOST_TEXT)]
 _OrNone = Annotated[_Text, BeforeValidator(lambda value: "" if value is None else value)]
 _OWN = ("status", "comment")
 """The keys that people write."""
-_OPTIONAL = (*_OWN, "minimal", "violates", "count", "seed")
+_OPTIONAL = (*_OWN, "minimal", "note", "violates", "count", "seed")
 """The keys that the block of a suite may lack."""
 
 
@@ -85,6 +85,8 @@ class Failure(ShapedSection):
     """Root cause of the failure."""
     minimal: _Text = ""
     """Conditions that the minimal scenario needs, in words."""
+    note: _Text = ""
+    """What makes the verdict doubtful: the time step, or a scenario beyond the validated region."""
     violates: list[CriterionSection] = Field(default_factory=list, max_length=1000)
     """Pass criteria that the failure violates."""
     count: Literal["ego", "any"] = "ego"

@@ -83,31 +83,27 @@ def total_of(types: Sequence[CrashType], quantity: str = "percent") -> float | N
 
 
 def named(kind: CrashType) -> str:
-    """Return a type with its shares in words."""
-    words = [] if kind.percent is None else [f"{percent(kind.percent / 100)}"]
-    words += [] if kind.harm is None else [f"{percent(kind.harm / 100)} of the harm"]
-    return " ".join((kind.name, *([f"({', '.join(words)})"] if words else [])))
+    """Return a type with its shares, of crashes and of harm, in words."""
+    known = [percent(value / 100) for value in (kind.percent, kind.harm) if value is not None]
+    return f"{kind.name} ({', '.join(known)})" if known else kind.name
+
+
+_QUANTITIES = {"percent": "crashes", "harm": "harm"}
 
 
 def shares(types: Sequence[CrashType]) -> str:
     """Return in words the shares of some types together; "" where none is known."""
-    named = (("percent", "crashes"), ("harm", "harm"))
-    found = [(total_of(types, quantity), what) for quantity, what in named]
+    found = [(total_of(types, quantity), what) for quantity, what in _QUANTITIES.items()]
     words = [f"{percent(share / 100)} of the {what}" for share, what in found if share is not None]
     return f", with {' and '.join(words)}" if words else ""
 
 
 def said(typology: Typology) -> str:
     """Return in words how much of a typology scenarios cover, and what is not known."""
-    missing = [
-        what
-        for quantity, what in (("percent", "crashes"), ("harm", "harm"))
-        if total_of(typology.types, quantity) is None
-    ]
+    missing = [what for name, what in _QUANTITIES.items() if total_of(typology.types, name) is None]
     words = f"{len(typology.covered)} of {len(typology.types)} types{shares(typology.covered)}"
-    return (
-        f"{words} (shares of {' and of '.join(missing)} by type: not known)" if missing else words
-    )
+    unknown = f" (shares of {' and of '.join(missing)} by type: not known)" if missing else ""
+    return words + unknown
 
 
 @cache
@@ -121,8 +117,4 @@ def typologies() -> Mapping[str, Typology]:
 
 def _read(name: str, types: Mapping[str, Any], **given: Any) -> Typology:
     kinds = tuple(CrashType(id, **kind) for id, kind in types.items())
-    return Typology(name=name, types=kinds, **{key: _text(value) for key, value in given.items()})
-
-
-def _text(value: Any) -> Any:
-    return value.strip() if isinstance(value, str) else value
+    return Typology(name=name, types=kinds, **given)

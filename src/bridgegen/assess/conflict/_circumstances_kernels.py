@@ -5,13 +5,14 @@
 
 import math
 
-from bridgegen.assess.conflict._geometry_kernels import turned
+from bridgegen.assess.conflict._geometry_kernels import pose_before, turned
 from bridgegen.assess.conflict._limits import (
     AHEAD,
     AHEAD_TIME,
     ALIKE,
     ASIDE,
     CROSSWALK_MARGIN,
+    HALVINGS,
     HORIZON,
     JUNCTION,
     JUST_NOW,
@@ -94,14 +95,15 @@ def stops_at_red(scene, e, k, time):
 
 
 @kernel
-def on_crosswalk(scene, e, k):
-    """Return whether the centre of body e is on a crosswalk of the ego's route at instant k."""
+def on_crosswalk(scene, e, k, early):
+    """Return whether body e's centre is on a crosswalk of the ego's route, at k less ``early``."""
     walks = scene.crosswalks
+    x, y, _, _ = pose_before(scene, e, k, early)
     for j in range(len(walks)):
         if not math.isfinite(walks[j, 0]):
             continue
         c, s = elementary.cos(walks[j, 2]), elementary.sin(walks[j, 2])
-        dx, dy = scene.x[e, k] - walks[j, 0], scene.y[e, k] - walks[j, 1]
+        dx, dy = x - walks[j, 0], y - walks[j, 1]
         along, across = abs(dx * c + dy * s), abs(dy * c - dx * s)
         if along <= walks[j, 3] + CROSSWALK_MARGIN and across <= walks[j, 4] + KERB:
             return True
@@ -110,10 +112,23 @@ def on_crosswalk(scene, e, k):
 
 @kernel
 def on_crosswalk_since(scene, e, k):
-    """Return the instant since which body e is on a crosswalk; k + 1 if it is not at k."""
-    while k >= scene.first and on_crosswalk(scene, e, k):
-        k -= 1
-    return k + 1
+    """Return the instant since which body e is on a crosswalk; k + 1 if it is not at k.
+
+    The second number is how much earlier it stepped on it, in steps, below 1.
+    """
+    i = k
+    while i >= scene.first and on_crosswalk(scene, e, i, 0.0):
+        i -= 1
+    if i < scene.first or i == k:
+        return i + 1, 0.0
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if on_crosswalk(scene, e, i + 1, middle):
+            low = middle
+        else:
+            high = middle
+    return i + 1, low
 
 
 @kernel

@@ -333,37 +333,47 @@ def entered(scene, a, b, end, margin):
 
     It is in the way where it reaches into the strip that a's body sweeps in the rollout, widened
     by a margin [m] to each side. ``end`` if it is not in the way yet; the second number is the side
-    on which it was before: 1 left, -1 right, 0 if it is in the way from the start.
+    on which it was before: 1 left, -1 right, 0 if it is in the way from the start. The third is how
+    much earlier than that instant it has reached the strip, in steps, below 1.
     """
     x, y, c, s = scene.x, scene.y, scene.c, scene.s
     own_width, length, width = scene.half[a, 1], scene.half[b, 0], scene.half[b, 1]
     j, k = end, end
     side = 0
+    before = after = 0.0
     while k >= scene.first:
         j, aside = beside(x[a], y[a], c[a], s[a], scene.first, scene.n, j, x[b, k], y[b, k])
         nx, ny = -s[a, j], c[a, j]
-        if abs(aside) >= own_width + margin + extent(nx, ny, c[b, k], s[b, k], length, width):
+        before = abs(aside) - own_width - margin - extent(nx, ny, c[b, k], s[b, k], length, width)
+        if before >= 0.0:
             side = 1 if aside > 0.0 else -1
             break
+        after = before
         k -= 1
-    return min(k + 1, end), side
+    early = after / (after - before) if side != 0 and k < end else 0.0
+    return min(k + 1, end), side, early
 
 
 @kernel
 def hidden(scene, e, k):
     """Return whether another body is between the ego's front and the centre of e at instant k."""
-    half, x, y, c, s = scene.half, scene.x, scene.y, scene.c, scene.s
-    ax = x[0, k] + half[0, 0] * c[0, k]
-    ay = y[0, k] + half[0, 0] * s[0, k]
-    bx, by = x[e, k], y[e, k]
-    for o in range(1, x.shape[0]):
+    return hidden_before(scene, e, k, 0.0)
+
+
+@kernel
+def hidden_before(scene, e, k, early):
+    """Return the same of a moment that is earlier than instant k, by less than a step."""
+    half = scene.half
+    xe, ye, c, s = pose_before(scene, 0, k, early)
+    ax, ay = xe + half[0, 0] * c, ye + half[0, 0] * s
+    bx, by, _, _ = pose_before(scene, e, k, early)
+    for o in range(1, scene.x.shape[0]):
         if o == e or scene.distance[o, k] == math.inf:
             continue
         # the segment in o's frame, clipped to its box
-        px = (ax - x[o, k]) * c[o, k] + (ay - y[o, k]) * s[o, k]
-        py = (ay - y[o, k]) * c[o, k] - (ax - x[o, k]) * s[o, k]
-        qx = (bx - x[o, k]) * c[o, k] + (by - y[o, k]) * s[o, k]
-        qy = (by - y[o, k]) * c[o, k] - (bx - x[o, k]) * s[o, k]
+        xo, yo, c, s = pose_before(scene, o, k, early)
+        px, py = (ax - xo) * c + (ay - yo) * s, (ay - yo) * c - (ax - xo) * s
+        qx, qy = (bx - xo) * c + (by - yo) * s, (by - yo) * c - (bx - xo) * s
         begin, end = sweep(px, qx - px, half[o, 0], 1e-12)
         start, stop = sweep(py, qy - py, half[o, 1], 1e-12)
         if max(begin, start, 0.0) <= min(end, stop, 1.0):
@@ -372,11 +382,37 @@ def hidden(scene, e, k):
 
 
 @kernel
-def visible_from(scene, e, since, k):
-    """Return the first instant from ``since`` on at which the ego could see body e; k at most."""
-    while since < k and hidden(scene, e, since):
-        since += 1
-    return since
+def pose_before(scene, e, k, early):
+    """Return place and direction of body e, earlier than instant k by a share of a step."""
+    x, y, c, s = scene.x[e, k], scene.y[e, k], scene.c[e, k], scene.s[e, k]
+    if early <= 0.0:
+        return x, y, c, s
+    x, y = x - early * (x - scene.x[e, k - 1]), y - early * (y - scene.y[e, k - 1])
+    return x, y, c - early * (c - scene.c[e, k - 1]), s - early * (s - scene.s[e, k - 1])
+
+
+@kernel
+def visible_from(scene, e, since, early, k):
+    """Return the first instant from ``since`` on at which the ego could see body e; k at most.
+
+    The second number is how much earlier than that instant it came into sight, in steps, below 1,
+    or ``early`` if it was in sight ``early`` steps before ``since``.
+    """
+    i, high = since, early
+    while hidden(scene, e, i):
+        if i >= k:
+            return k, 0.0
+        i, high = i + 1, 1.0
+    if high <= 0.0 or not hidden_before(scene, e, i, high):
+        return i, high
+    low = 0.0  # in sight; hidden at ``high``
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if hidden_before(scene, e, i, middle):
+            high = middle
+        else:
+            low = middle
+    return i, low
 
 
 @kernel

@@ -23,6 +23,10 @@ class FitProgress(Live):
         """Show how many of how many parameters are done."""
         self.show(what="parameters", done=done, total=total)
 
+    def replayed(self, done: int, total: int) -> None:
+        """Show how many of how many batches of recorded events are simulated."""
+        self.show(what="replays", done=done, total=total)
+
 
 def print_fit(fit: "Fit", written: "Sequence[Path]", *, as_json: bool) -> None:
     """Print the forms with their goodness of fit, rates and files; on stderr what to know."""
@@ -46,7 +50,7 @@ def print_fit(fit: "Fit", written: "Sequence[Path]", *, as_json: bool) -> None:
         as_json=False,
     )
     print()
-    for text in fit.facts():
+    for text in (*fit.facts(), fit.exposure.left_out):
         print(text)
     print()
     for path in written:
@@ -54,7 +58,7 @@ def print_fit(fit: "Fit", written: "Sequence[Path]", *, as_json: bool) -> None:
 
 
 def _plain(fit: "Fit", written: "Sequence[Path]") -> dict[str, object]:
-    encounters = fit.exposure.encounters
+    encounters, twins = fit.exposure.encounters, fit.exposure.parameterisation
     return {
         "scenario": fit.exposure.scenario.name,
         "rows": fit.rows,
@@ -74,6 +78,7 @@ def _plain(fit: "Fit", written: "Sequence[Path]") -> dict[str, object]:
         "per_hour": _rate(encounters.per_hour if encounters else None),
         "per_km": _rate(encounters.per_km if encounters else None),
         "feasible_share": fit.exposure.feasible_share.estimate,
+        "parameterisation": twins.figures() if twins else None,
         "seed": fit.seed,
         "files": [str(path) for path in written],
     }

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bridgegen.jobs.search.loop import Progress
     from bridgegen.jobs.search.settings import Settings
     from bridgegen.scenario.language.coverage import Coverage, ParameterBins
+    from bridgegen.scenario.odd.coverage import OddCoverage
     from bridgegen.search.triage import Triage
 
 _STAGES = {
@@ -264,6 +265,8 @@ def _found_lines(found: "Triage") -> list[str]:
         lines.append(f"N{found.bound.not_counted[1:]}")
     if found.missed:
         lines.append(f"Time step: {steps_in_words(found)}")
+    if found.extrapolated:
+        lines.append(f"Extrapolated: {found.extrapolated}")
     return lines
 
 
@@ -314,10 +317,18 @@ def _count(value: int | None) -> str:
 # --- A run's coverage ---
 
 
-def print_coverage(run: Path, settings: "Settings", found: "Coverage", *, as_json: bool) -> None:
+def print_coverage(
+    run: Path,
+    settings: "Settings",
+    found: "Coverage",
+    of_odd: "OddCoverage | None",
+    *,
+    as_json: bool,
+) -> None:
     """Print the number of evaluated t-way combinations of bins, then each parameter's bins."""
     if as_json:
-        print(json.dumps({"run": str(run), **_plain(asdict(found))}, indent=2))
+        odd = {} if of_odd is None else {"odd": of_odd.to_json()}
+        print(json.dumps({"run": str(run), **_plain(asdict(found)), **odd}, indent=2))
         return
     print(
         f"{run}: {Path(settings.scenario).stem}, {settings.algorithm}, {found.evaluations} "
@@ -344,6 +355,23 @@ def print_coverage(run: Path, settings: "Settings", found: "Coverage", *, as_jso
                 + "".join(f"{f'{share:.1%}':>10}" for share in parameter.met)
                 + "  of the road"
             )
+    if of_odd is not None:
+        _print_odd(of_odd)
+
+
+def _print_odd(found: "OddCoverage") -> None:
+    title = f"{found.odd.name} ({found.odd.title})"
+    print(f"\nOf the ODD {title}, {found.pairs_in_words}:")
+    rows = [
+        (
+            each.name,
+            f"{len(each.labels) - len(each.untried)} of {len(each.labels)}" if each.labels else "–",
+            f"{each.tested} of {len(each.limits)}" if each.limits else "–",
+            "; ".join(filter(None, (", ".join(each.untried), each.problem))) or "–",
+        )
+        for each in found.attributes
+    ]
+    print_table(("attribute", "values tried", "limits tried", "never tried"), rows, as_json=False)
 
 
 def _cells(parameter_bins: "ParameterBins") -> str:

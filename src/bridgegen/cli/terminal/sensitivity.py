@@ -28,7 +28,8 @@ class SensitivityProgress(Live):
 def print_sensitivity(run: Path, found: "Sensitivity", *, as_json: bool) -> None:
     """Print what each constant moves, then the findings that hang on one."""
     from bridgegen.base.units import percent
-    from bridgegen.jobs.search.sensitivity import PAGE, in_a_sentence, shares
+    from bridgegen.jobs.search.report import SENSITIVITY
+    from bridgegen.jobs.search.sensitivity import in_a_sentence, shares
 
     if as_json:
         print(found.model_dump_json(indent=2))
@@ -62,4 +63,4 @@ def print_sensitivity(run: Path, found: "Sensitivity", *, as_json: bool) -> None
             f"{found.left_out} more were not analysed: --findings, --budget, or a verdict that is "
             "not reproduced."
         )
-    print(f"{found.evaluations:,} evaluations, seed {found.seed}: {run / PAGE}")
+    print(f"{found.evaluations:,} evaluations, seed {found.seed}: {run / SENSITIVITY}")

@@ -196,6 +196,15 @@ def _criteria_texts(given: Iterable[Mapping[str, Any]]) -> list[str]:
     return [in_words(read_criterion(record)) for record in given]
 
 
+def _kept_odd(given: str | PathLike[str] | Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """Return an ODD as plain data, of a file's path or such data."""
+    if given is None or isinstance(given, Mapping):
+        return None if given is None else dict(given)
+    from bridgegen.scenario.odd.reader import read_odd
+
+    return read_odd(Path(given)).to_record()
+
+
 def _kept_terms(terms: Mapping[str, float | None] | Iterable[str] | None) -> Any:
     if terms is None or isinstance(terms, Mapping):
         return None if terms is None else dict(terms)
@@ -309,6 +318,15 @@ CRITERIA = Form(
     "criteria",
 )
 """Form of criteria: ``ID: FORMULA``, a mapping in braces, or the path of a file; repeated."""
+
+ODD = Form(
+    Path,
+    words=lambda spelling, odd: [spelling, str(odd["path"])],
+    keep=lambda given: _kept_odd(given),
+    valid=lambda odd: isinstance(odd, dict),
+    must="the path of an OpenODD file",
+)
+"""Form of an operational design domain: its file's path; kept with all that it holds."""
 
 SIMULATOR = Form(
     None,

@@ -14,6 +14,7 @@ from bridgegen.engine.options.forms import (
     FLAG,
     NAMES,
     NUMBER,
+    ODD,
     PATH,
     SCREEN,
     SETTINGS,
@@ -32,6 +33,13 @@ MAX_BUDGET = 10**7
 MAX_SEED = 2**32 - 1
 MAX_KEEP = 1000
 MAX_AHEAD = 10_000
+
+OF_ODD = option(
+    ODD,
+    "Operational design domain: an ASAM OpenODD 1.0 file.",
+    before=None,
+)
+"""Metadata of the field of an operational design domain."""
 
 _CAUSES = option(
     FLAG,
@@ -210,6 +218,7 @@ class CommonOptions(PipelineOptions):
             names="parameter",
         ),
     )
+    odd: Mapping[str, Any] | Path | str | None = field(default=None, metadata=OF_ODD)
     road_map: Path | str | None = field(
         default=None,
         metadata=option(

@@ -1,6 +1,7 @@
 """The comparison on one self-contained page: sentences, tables, figures, and every run."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -75,10 +76,10 @@ def _facts(comparison: Comparison) -> Iterator[str]:
     yield f"baseline: {plan.baseline}"
     for name, value in vars(plan.options).items():
         if value not in (None, False, (), {}):
-            shown = value
+            shown = Path(value["path"]).name if name == "odd" else value
             if isinstance(value, tuple):
                 shown = ", ".join(map(_shown, value))
-            elif isinstance(value, dict):
+            elif isinstance(shown, dict):
                 shown = ", ".join(
                     k if item is None else f"{k} = {item:g}" for k, item in value.items()
                 )

@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from importlib.metadata import distributions
 from itertools import groupby
+from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -13,6 +14,7 @@ from bridgegen.jobs.credibility.convergence import (
     QUANTITIES,
     STEPS,
     Convergence,
+    finest,
     series,
     state,
 )
@@ -23,10 +25,28 @@ from bridgegen.jobs.safety_case.model import Form, Number
 from bridgegen.jobs.safety_case.numbers import RUN, TRIAGE, Numbers
 from bridgegen.results.confirmation.record import PREFIX
 from bridgegen.results.confirmation.summary import summarise
+from bridgegen.scenario.exposure.reader import read_parameterisation
+from bridgegen.scenario.language.parameterisation import Parameterisation
 from bridgegen.search.triage.record import AtStep, StepCheck
 
 SENSITIVITY = "sensitivity.json"
 """File of a run's folder that says which constants of the models its verdicts depend on."""
+
+EXPOSURE, BLOCK = "exposure.yaml", b"\n  parameterisation:"
+"""File of a run's folder that ``bridgegen fit`` writes, and how its block on recorded twins
+begins."""
+
+
+def twins_of(folder: Path) -> Parameterisation | None:
+    """Return what a run's folder says of recorded events and their twins; None: nothing.
+
+    Raises:
+        BridgeGenError: its exposure cannot be read.
+    """
+    path = folder / EXPOSURE
+    found = read_parameterisation(path) if path.is_file() else None
+    return found if found and BLOCK in path.read_bytes() else None
+
 
 EVERY = "all"
 """The first part of the ids of numbers that are of all runs together."""
@@ -55,6 +75,8 @@ def measure(runs: Mapping[str, Facts]) -> dict[str, Number]:
         every.add("distributions", exposed)
     if analysed := sum((facts.run.folder / SENSITIVITY).is_file() for facts in runs.values()):
         every.add("sensitivity", analysed, source=SENSITIVITY)
+    if recorded := sum(twins_of(facts.run.folder) is not None for facts in runs.values()):
+        every.add("recorded", recorded, source=EXPOSURE)
     _of_steps(list(runs.values()), every)
     _of_simulators(list(runs.values()), every)
     return {number.id: number for numbers in (*found, every) for number in numbers.all}
@@ -105,13 +127,14 @@ def _of_steps(runs: Sequence[Facts], numbers: Numbers) -> None:
             add(f"{name}_at", len(at), of=str(steps))
             add(f"{name}_kept", sum(state(a) == state(b) for a, b in at), of=str(steps))
     for quantity, unit in QUANTITIES.items():
-        rows = [row for row in (series(check, quantity) for check in findings) if row is not None]
+        found = [(check, series(check, quantity)) for check in findings]
+        rows = [(check, row) for check, row in found if row is not None]
         if not rows:
             continue
-        made = [Convergence.of(row) for row in rows]
+        made = [Convergence.of(row, finest(check, quantity)) for check, row in rows]
         add("series", len(made), of=quantity)
-        add("unchanged", sum(max(row) == min(row) for row in rows), of=quantity)
-        for name in ("error", "extrapolated", "gci"):
+        add("unchanged", sum(len(set(row)) == 1 for _, row in rows), of=quantity)
+        for name in ("error", "extrapolated", "gci", "stated"):
             values = [getattr(one, name) for one in made]
             add(f"{name}_median", median(values), "number", of=quantity, unit=unit)
             add(f"{name}_q95", float(np.quantile(values, 0.95)), "number", of=quantity, unit=unit)

@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from bridgegen.jobs.safety_case.model import Evidence, Number, RunFacts, Statement
+from bridgegen.results.validated import Region
 
 FILE = "credibility.json"
 
@@ -75,6 +76,28 @@ class Flip(_Model):
     text: str
 
 
+class Comparison(_Model):
+    """Real tests beside the simulation of the same scenarios; figures are numbers of the dossier.
+
+    Attributes:
+        run: its id.
+        series: what is compared together.
+        quantity: name of the metric.
+        unit: of it.
+        tests: how many.
+        threshold: greatest area that people accept; None if they state none.
+        verdict: on the area: its interval is below the threshold, above it, or holds it.
+    """
+
+    run: str
+    series: str
+    quantity: str
+    unit: str
+    tests: int
+    threshold: float | None
+    verdict: str
+
+
 class Dossier(_Model):
     """A credibility dossier.
 
@@ -91,6 +114,8 @@ class Dossier(_Model):
         numbers: every number in the texts.
         items: in the order of the chapters.
         flips: what depends on the time step.
+        comparisons: with real tests.
+        validated: the region of each scenario that has evidence.
         gaps: everything that is missing.
         installed: installed distributions with their versions.
         evidence: the files that the numbers are of.
@@ -108,6 +133,8 @@ class Dossier(_Model):
     numbers: tuple[Number, ...]
     items: tuple[Item, ...]
     flips: tuple[Flip, ...]
+    comparisons: tuple[Comparison, ...] = ()
+    validated: tuple[Region, ...] = ()
     gaps: tuple[Gap, ...]
     installed: dict[str, str]
     evidence: tuple[Evidence, ...]
@@ -126,4 +153,5 @@ class Dossier(_Model):
             "findings": float(value.get("all.findings", 0)),
             "flips": sum(flips),
             "sample_flips": len(flips) - sum(flips),
+            "refused": float(value.get("all.refused", 0)),
         }

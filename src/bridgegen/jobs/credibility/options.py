@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bridgegen.engine.options.forms import PATH
+from bridgegen.engine.options.forms import FLAG, PATH
 from bridgegen.engine.options.option import OUTPUT, WHAT, option
 from bridgegen.jobs.frame import PATHS, Job, JobOptions
 
@@ -15,11 +15,22 @@ class CredibilityOptions(JobOptions):
 
     runs: Path | str | Sequence[Path | str] = field(
         kw_only=False,
+        default=(),
         metadata=option(
             PATHS,
             "Folders of finished runs, or of projects with runs in them.",
+            shown="none, which --validate allows",
             group=WHAT,
             is_argument=True,
+        ),
+    )
+    validate: bool = field(
+        default=False,
+        metadata=option(
+            FLAG,
+            "Run the validation suite: does this installation give answers that are known? Its "
+            "protocol is validation.json.",
+            group=WHAT,
         ),
     )
     out: Path | str | None = field(
@@ -27,7 +38,7 @@ class CredibilityOptions(JobOptions):
         metadata=option(
             PATH,
             "Folder for the files.",
-            shown="RUN/dossier, or dossier for several runs or a project",
+            shown="RUN/dossier, or dossier for several runs, a project or none",
             group=OUTPUT,
         ),
     )
@@ -54,7 +65,11 @@ JOB = Job(
         "findings": "findings that were simulated at fractions of the time step",
         "flips": "of them, those whose verdict or kind of conflict depends on the time step",
         "sample_flips": "evaluations without failure, of a sample, that depend on it",
+        "refused": "comparisons with real tests whose area is beyond its threshold",
+        "cases": "cases of the validation suite; with --validate",
+        "wrong": "of them, those with a wrong answer",
+        "other_bits": "of them, those with other bits than the published ones",
     },
     example="flips > 0",
-    fails="a run could not be read",
+    fails="a run could not be read, a case of the validation suite fails",
 )

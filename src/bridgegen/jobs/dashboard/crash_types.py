@@ -6,8 +6,6 @@ A failure counts in a type where a scenario that realises it fails in a conflict
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bridgegen.jobs.dashboard.modes import OpenMode
-from bridgegen.jobs.dashboard.results import Result
 from bridgegen.jobs.dashboard.verdicts import Standing, Verdict
 from bridgegen.pages.templates import counted
 from bridgegen.scenario.typology import (
@@ -33,22 +31,16 @@ LIMITS = (
 
 
 @dataclass(frozen=True)
-class TypeStanding:
-    """How a driver stands in a type of crash.
+class TypeStanding(Standing):
+    """How a driver stands in a type of crash; only modes of the type's kind count.
 
     Attributes:
-        verdict: "not judged" also where its scenarios fail, but in other conflicts alone.
-        modes: of the type's kind, that fail now, the gravest first.
         scenarios: that were tried.
         otherwise: those that fail, but in other conflicts or in random draws alone.
-        result: the one that a reader looks at first; None where nothing was tried.
     """
 
-    verdict: Verdict
-    modes: tuple[OpenMode, ...]
-    scenarios: tuple[str, ...]
-    otherwise: tuple[str, ...]
-    result: Result | None
+    scenarios: tuple[str, ...] = ()
+    otherwise: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -119,9 +111,7 @@ def _standing(
         name: [mode for mode in standing.modes if mode.key.conflict_type in kind.conflicts]
         for name, standing in found.items()
     }
-    modes = sorted(
-        (mode for some in own.values() for mode in some), key=lambda mode: -mode.severity
-    )
+    modes = sorted((mode for some in own.values() for mode in some), key=lambda m: -m.severity)
     otherwise = tuple(
         name for name, standing in found.items() if standing.verdict == "fails" and not own[name]
     )
@@ -133,7 +123,5 @@ def _standing(
         verdict = "not judged"
     elif found:
         verdict = "no failure found"
-    first = modes[0].results[0] if modes else None
-    results = [first, *(standing.worst for standing in found.values())]
-    worst = next((result for result in results if result is not None), None)
-    return TypeStanding(verdict, tuple(modes), tuple(found), otherwise, worst)
+    results = tuple(result for standing in found.values() for result in standing.results)
+    return TypeStanding(verdict, tuple(modes), results, tuple(found), otherwise)

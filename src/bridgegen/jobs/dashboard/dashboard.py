@@ -278,7 +278,9 @@ def build_dashboard(given: DashboardOptions) -> Dashboard:
     # Before the results are read, which may take long.
     refuse_other(page, GENERATOR, "dashboard")
     project = read_project(
-        folder, lambda number, total: given.callbacks.progress("folders", number, total, "")
+        folder,
+        lambda number, total: given.callbacks.progress("folders", number, total, ""),
+        given.odd if isinstance(given.odd, Mapping) else None,
     )
     if update and (
         damaged := [problem.why for problem in project.problems if problem.place.endswith(FILE)]

@@ -3,8 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from bridgegen.engine.options.forms import CRITERIA, FLAG, PATH
+from bridgegen.engine.options.forms import CRITERIA, FLAG, ODD, PATH
 from bridgegen.engine.options.option import OBJECTIVE, OUTPUT, WHAT, option
 from bridgegen.jobs.frame import Job, JobOptions
 
@@ -36,6 +37,15 @@ class DashboardOptions(JobOptions):
             spelling="--criterion",
             hint="May be repeated.",
             group=OBJECTIVE,
+        ),
+    )
+    odd: Mapping[str, Any] | Path | str | None = field(
+        default=None,
+        metadata=option(
+            ODD,
+            "The project's operational design domain: a file in ASAM OpenODD 1.0's YAML.",
+            shown="that of the first run that has one",
+            group=WHAT,
         ),
     )
     update: bool = field(

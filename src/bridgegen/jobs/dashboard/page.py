@@ -14,6 +14,7 @@ from bridgegen.jobs.dashboard.crash_types import TypeStanding
 from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
 from bridgegen.jobs.dashboard.odd import Coverage, Covered
+from bridgegen.jobs.dashboard.of_odd import ProjectOdd
 from bridgegen.jobs.dashboard.requirements import Matrix, statements
 from bridgegen.jobs.dashboard.results import Result, versions
 from bridgegen.jobs.dashboard.results_of import SuiteLine
@@ -26,6 +27,7 @@ from bridgegen.pages.sentences import share
 from bridgegen.pages.templates import Banner, Cell, counted, joined, when
 from bridgegen.pages.thumbnails import Thumbnail, drawn, read_thumbnails
 from bridgegen.results.failures import FILE
+from bridgegen.scenario.odd.coverage import OddAttribute
 from bridgegen.scenario.typology import CrashType, most_harmful, named, shares
 
 MOST_MODES = 300
@@ -124,6 +126,7 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         covered="Taxonomy: {} covered, {} not covered, {} not expressible".format(
             *found.coverage.counts
         ),
+        of_odd=_of_odd(found.project.odd),
         attributes=[*_attributes(found.coverage.attributes)],
         partly=sorted(partly),
         parameters=_parameters(found.coverage),
@@ -326,7 +329,7 @@ def _types(found: Dashboard, base: str) -> dict[str, Any] | None:
 
 
 def _of_type(kind: CrashType, standing: TypeStanding, driver: str, base: str) -> Cell:
-    text, worst = str(standing.verdict), standing.result
+    text, worst = str(standing.verdict), standing.worst
     notes = [joined(standing.scenarios, 3)] if standing.scenarios else []
     if standing.modes:
         fails = {mode.key.scenario for mode in standing.modes}
@@ -541,7 +544,61 @@ def _once(some: list[Series], base: str) -> Table:
     return _table("Measured once", heads, rows, title=title)
 
 
-# --- The operational design domain: the taxonomy, then parameters ---
+# --- The operational design domain: its file, the taxonomy, then parameters ---
+
+
+def _of_odd(odd: ProjectOdd) -> dict[str, Any] | None:
+    """Return the project's ODD: its name, a sentence, and its attributes; None without one."""
+    found = odd.coverage
+    if found is None:
+        return None
+    words = [
+        f"{counted(odd.runs, 'run')}: {counted(found.evaluations, 'evaluation')} inside, of which "
+        f"{found.failures:,} fail; {odd.outside:,} outside",
+        found.pairs_in_words,
+    ]
+    words += [f"not read of {counted(odd.unread, 'run')}"] if odd.unread else []
+    words += [f"other ODDs bound runs, too: {joined(sorted(odd.others))}"] if odd.others else []
+    rows = [
+        [
+            each.name,
+            _asks(each),
+            _span_of(each.low, each.high) if each.low <= each.high else "–",
+            (charts.strip(each.evaluations), _worst(each)) if any(each.evaluations) else "–",
+            f"{each.tested} of {len(each.limits)}" if each.limits else "–",
+            Cell(joined(each.untried, 6) or "–", [each.problem] if each.problem else []),
+        ]
+        for each in found.attributes
+    ]
+    heads = (
+        "attribute",
+        "inside",
+        "searched",
+        "evaluations by value",
+        "limits tried",
+        "never tried",
+    )
+    title = f"{found.odd.title} ({found.odd.name})"
+    return {"title": title, "words": "; ".join(words) + ".", "table": _table(title, heads, rows)}
+
+
+def _asks(each: OddAttribute) -> str:
+    if each.edges and each.unit != "count":
+        return f"{_span_of(each.edges[0], each.edges[-1])} {each.unit}"
+    return ", ".join(each.labels) or "–"
+
+
+def _span_of(low: float, high: float) -> str:
+    ends = dict.fromkeys(f"{x:,.0f}" if abs(x) >= 1000 else f"{x:.4g}" for x in (low, high))
+    return " to ".join(ends)
+
+
+def _worst(each: OddAttribute) -> str:
+    """Return where the largest part of evaluations fails."""
+    tried = [k for k, n in enumerate(each.evaluations) if n]
+    k = max(tried, key=lambda k: each.failures[k] / each.evaluations[k])
+    n, failed = each.evaluations[k], each.failures[k]
+    return f"{each.labels[k]}: {failed:,} of {n:,} fail" if failed else "none fails"
 
 
 def _attributes(some: Iterable[Covered]) -> Iterator[tuple[str, list[tuple[str, Table, str]]]]:

@@ -3,9 +3,11 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from bridgegen.base.errors import BridgeGenError, StorageError
 from bridgegen.jobs.compare.plan import FILE as COMPARISON_FILE
+from bridgegen.jobs.dashboard.of_odd import ProjectOdd
 from bridgegen.jobs.dashboard.results import Result, place_of
 from bridgegen.jobs.dashboard.results_of import (
     ComparisonLine,
@@ -24,6 +26,7 @@ from bridgegen.jobs.view.overview import MOST_RUNS, find_folders
 from bridgegen.results.failures import FILE as FAILURES
 from bridgegen.results.failures import FailureFile, read_failures
 from bridgegen.results.store.run_file import FILE as RUN_FILE
+from bridgegen.scenario.odd.reader import odd_of
 
 _FILES = (RUN_FILE, SUITE_FILE, MAP_FILE, COMPARISON_FILE)
 
@@ -55,6 +58,7 @@ class Project:
         problems: what cannot be read.
         decisions: the files ``failures.yaml`` below the folder and beside the scenarios of suites,
             by folder; not that of the folder itself.
+        odd: its operational design domain, and what its runs have of that.
     """
 
     folder: Path
@@ -65,6 +69,7 @@ class Project:
     sceneries: dict[str, Scenery]
     problems: tuple[Problem, ...]
     decisions: Mapping[Path, FailureFile] = field(default_factory=dict)
+    odd: ProjectOdd = field(default_factory=ProjectOdd)
 
     @property
     def results(self) -> tuple[Result, ...]:
@@ -72,12 +77,17 @@ class Project:
         return (*self.runs, *(result for suite in self.suites for result in suite.results))
 
 
-def read_project(folder: Path, begun: Callable[[int, int], None] | None = None) -> Project:
+def read_project(
+    folder: Path,
+    begun: Callable[[int, int], None] | None = None,
+    odd: Mapping[str, Any] | None = None,
+) -> Project:
     """Read all runs, suites, maps and comparisons below a folder.
 
     Args:
         folder: of the project.
         begun: called with the number of folders that are read, and of all.
+        odd: the project's operational design domain; that of its first run by default.
 
     Raises:
         StorageError: there is no such folder, or none of these is in it.
@@ -85,7 +95,7 @@ def read_project(folder: Path, begun: Callable[[int, int], None] | None = None) 
     root = folder.resolve()
     if not root.is_dir():
         raise StorageError(f"{folder}: there is no such folder")
-    reader = _Reader(root)
+    reader = _Reader(root, ProjectOdd.of(None if odd is None else odd_of(odd)))
     found = find_folders(root, reader.is_result)
     if not found:
         raise StorageError(
@@ -114,8 +124,8 @@ def kind_of(folder: Path) -> str | None:
 
 
 class _Reader:
-    def __init__(self, root: Path) -> None:
-        self.root = root
+    def __init__(self, root: Path, odd: ProjectOdd) -> None:
+        self.root, self.odd = root, odd
         self.sceneries = Sceneries()
         self.runs: list[Result] = []
         self.suites: list[SuiteLine] = []
@@ -137,7 +147,7 @@ class _Reader:
         try:
             kind = kind_of(folder)
             if kind == RUN_FILE:
-                self.runs.append(read_run(self.root, folder, self.sceneries))
+                self.runs.append(read_run(self.root, folder, self.sceneries, self.odd))
             elif kind == SUITE_FILE:
                 suite = read_suite_line(self.root, folder, self.sceneries)
                 self.suites.append(suite)
@@ -172,6 +182,7 @@ class _Reader:
             self.sceneries.by_name(self.root),
             tuple(problems),
             decisions,
+            self.odd,
         )
 
     def _decisions(self) -> dict[Path, FailureFile]:

@@ -1,5 +1,6 @@
 """Folders of a project become results: runs, suites, and those that test no driver for failures."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
@@ -17,6 +18,7 @@ from bridgegen.drivers.drivers import join
 from bridgegen.drivers.identity import Identity
 from bridgegen.jobs.compare.plan import FILE as COMPARISON_FILE
 from bridgegen.jobs.compare.result import PAGE as COMPARISON_PAGE
+from bridgegen.jobs.dashboard.of_odd import ProjectOdd
 from bridgegen.jobs.dashboard.results import (
     Driver,
     Failure,
@@ -49,16 +51,19 @@ from bridgegen.search.triage.record import Mode
 # --- A run's folder → a result ---
 
 
-def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
+def read_run(project: Path, folder: Path, sceneries: Sceneries, odd: ProjectOdd) -> Result:
     """Return the result of a run.
 
     Raises:
         StorageError: it cannot be read.
     """
     seen: list[Seen | None] = []
-    line = read_line(
-        project, folder, lambda store, settings: seen.append(_seen(store, settings, sceneries))
-    )
+
+    def read(store: Store, settings: Settings) -> None:
+        seen.append(_seen(store, settings, sceneries))
+        odd.add(store, settings)
+
+    line = read_line(project, folder, read)
     settings = line.settings
     if settings is None:
         raise StorageError(line.problem)
@@ -160,6 +165,7 @@ def _seen(store: Store, settings: Settings, sceneries: Sceneries) -> Seen | None
         str(settings.distribution or ""),
         settings.empty_trigger or "",
         settings.road_map is not None,
+        "" if settings.odd is None else json.dumps(settings.odd),
     )
     scenery = sceneries.of(source, settings.fingerprint)
     if scenery is None:
@@ -350,7 +356,7 @@ def _scenery(project: Path, entry_result: EntryResult, sceneries: Sceneries) -> 
     distribution = (
         str(_path(project, entry_result.distribution)) if entry_result.distribution else ""
     )
-    return sceneries.of((scenario, distribution, "", False))
+    return sceneries.of((scenario, distribution, "", False, ""))
 
 
 def _path(project: Path, text: str) -> Path:

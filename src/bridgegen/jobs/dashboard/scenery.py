@@ -1,8 +1,9 @@
 """What a scenario states of the taxonomy: facts, quantities, and the declared ranges."""
 
-from collections.abc import Callable, Mapping
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, reduce
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +12,15 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import BridgeGenError
 from bridgegen.jobs.dashboard.results import Seen, scenario_name
 from bridgegen.jobs.dashboard.taxonomy import QUANTITIES
-from bridgegen.jobs.search.scenarios import load
+from bridgegen.jobs.search.scenarios import load, within
 from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.openscenario.bodies import kind_of
+from bridgegen.scenario.language.expression import Expression
 from bridgegen.scenario.language.parameters import Parameter
-from bridgegen.scenario.language.roads import Quantity, RoadsSpec
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
-from bridgegen.scenario.participants import PARTICIPANTS
-from bridgegen.scenario.weather import CLEAR_AIR, CLOUDBURST, DRIZZLE, GALE, THICK_FOG
+from bridgegen.scenario.odd.states import facts_of_roads, states_of
+from bridgegen.scenario.odd.states import kind_of as kind_of_participant
 
 BINS = 10
 """Number of bins of a declared range; a parameter of whole numbers has one for each, up to
@@ -31,51 +32,6 @@ Columns = Mapping[str, Float]
 """Values of parameters by name, ``(N,)`` each, with those that stand at their default."""
 
 _OF_FILES = "weather and speeds of an OpenSCENARIO file, of which the whole map counts"
-
-_KMH = 3.6
-_NOON = 100_000.0  # [lx] direct sunlight, OpenSCENARIO's figure; see weather.ILLUMINANCE
-
-_WEATHER: Mapping[str, tuple[str, Callable[[Float], Float]]] = {
-    "rain": (
-        "precipitation",
-        lambda x: np.where(x > 0.0, DRIZZLE * CLOUDBURST ** (x / 100.0), 0.0),
-    ),
-    "visual_range": ("fog_density", lambda x: CLEAR_AIR / THICK_FOG ** (x / 100.0)),
-    "illuminance": (
-        "sun_altitude_angle",
-        lambda x: _NOON * np.maximum(np.sin(np.radians(x)), 0.0),
-    ),
-    "cloud": ("cloudiness", lambda x: 8.0 * x / 100.0),
-    "wind": ("wind_intensity", lambda x: GALE * x / 100.0),
-    "wetness": ("wetness", lambda x: x),
-}
-"""Quantities of the weather, by the laws of `bridgegen.scenario.weather`."""
-
-
-@dataclass(frozen=True)
-class Measure:
-    """A quantity of the taxonomy in a scenario.
-
-    Attributes:
-        sources: names of parameters, or constants.
-        of: the quantity, in its unit, of their values ``(N,)``.
-    """
-
-    sources: tuple[Quantity, ...]
-    of: Callable[..., Float]
-
-    def values(self, columns: Columns) -> Float:
-        """Return the quantity, ``(N,)``, or ``(1,)`` where it is constant.
-
-        Raises:
-            KeyError: a parameter is not among the columns.
-        """
-        return self.of(
-            *(
-                columns[source] if isinstance(source, str) else np.array([source])
-                for source in self.sources
-            )
-        )
 
 
 @dataclass(frozen=True)
@@ -95,7 +51,7 @@ class Scenery:
     facts: frozenset[str]
     parameters: tuple[Parameter, ...]
     defaults: Mapping[str, float]
-    quantities: Mapping[str, Measure] = field(repr=False)
+    quantities: Mapping[str, Expression] = field(repr=False)
     partly: str = ""
 
     @cached_property
@@ -112,8 +68,7 @@ class Scenery:
     @cached_property
     def columns(self) -> frozenset[str]:
         """The parameters on whose values the counts depend."""
-        sources = (source for each in self.quantities.values() for source in each.sources)
-        return frozenset(self.edges) | {source for source in sources if isinstance(source, str)}
+        return frozenset(self.edges).union(*(each.names for each in self.quantities.values()))
 
     def inner(self, name: str, value: float | str) -> float:
         """Return the inner value of a parameter that varies, from what people read."""
@@ -141,10 +96,9 @@ class Scenery:
                 found.outside[name] = outside
         for name, of in self.quantities.items():
             upper = QUANTITIES[name].upper
-            try:
-                x = np.broadcast_to(of.values(filled), (n,))
-            except KeyError:
+            if not of.names <= filled.keys():
                 continue  # of a column that the result does not hold
+            x = np.broadcast_to(of.evaluate(filled), (n,))
             known = x[~np.isnan(x)]
             where = np.searchsorted(upper, known, side="left")
             found.bands[name] = np.bincount(where, minlength=len(upper)).tolist()
@@ -164,7 +118,9 @@ def scenery_of(scenario: SearchedScenario, *, on_map: bool = False) -> Scenery:
     defaults = {parameter.name: parameter.default for parameter in scenario.parameters.values()}
     if isinstance(scenario, LogicalScenario):
         defaults = scenario.usual_values()
-        facts, quantities = _of_logical(scenario, on_map)
+        states = states_of(scenario, on_map=on_map)
+        facts = set(states.facts) | (set() if on_map else facts_of_roads(scenario.roads))
+        quantities = {name: of for name, of in states.quantities.items() if name in QUANTITIES}
         partly = "roads of a map that a scenario is placed on" if on_map else ""
     elif isinstance(scenario, FileScenario):
         facts, quantities, partly = _of_file(scenario), {}, _OF_FILES
@@ -173,86 +129,6 @@ def scenery_of(scenario: SearchedScenario, *, on_map: bool = False) -> Scenery:
     return Scenery(
         scenario.title, frozenset(facts), parameters, defaults, quantities, partly=partly
     )
-
-
-# ---- logical scenarios ----
-
-
-def _of_logical(scenario: LogicalScenario, on_map: bool) -> tuple[set[str], dict[str, Measure]]:
-    kinds = {
-        kind
-        for participant in scenario.participants
-        if participant.name != "ego"
-        for kind in (participant.types or (participant.type,))
-    }
-    facts = {f"participant:{_kind(item)}" for item in kinds}
-    facts |= {"participant:emergency" for participant in scenario.participants if participant.siren}
-    facts |= {"jam"} if scenario.story.jams else set()
-    facts |= {"road works", "warning sign"} if scenario.story.works else set()
-    quantities = {name: Measure((source,), of) for name, (source, of) in _WEATHER.items()}
-    quantities["ego_speed"] = Measure((scenario.ego.speed,), lambda v: _KMH * v)
-    if not on_map:
-        facts |= _facts_of_roads(scenario.roads)
-        quantities |= _quantities_of_roads(scenario.roads)
-    return facts, quantities
-
-
-def _kind(name: str) -> str:
-    """Return the kind of a participant by the taxonomy's classes: a van is with the cars."""
-    if name not in PARTICIPANTS:
-        return "car"  # a vehicle by its model's name
-    return name if name == "emergency" else PARTICIPANTS[name].seen_as.name
-
-
-def _facts_of_roads(roads: RoadsSpec) -> set[str]:
-    template, knobs = roads.template, roads.knobs
-    facts = {"traffic lane", "marked", "right-hand traffic", roads.road_type}
-    facts |= {"slip road", "divided"} if template == "merge" else set()
-    if template in ("crossroads", "t-junction"):
-        facts |= {template, "undivided"}
-        facts.add("junction without lights" if roads.signals == "none" else "traffic lights")
-    if template == "roundabout":
-        facts.add("undivided")
-    if template == "road":
-        facts.add("divided" if knobs["lanes_against"] == 0 else "undivided")
-    facts |= {"pavement"} if knobs["sidewalk_width"] != 0 else set()
-    facts |= {"shoulder"} if knobs["shoulder_width"] != 0 else set()
-    if roads.crosswalk_at is not None or any(leg.crosswalk for leg in roads.legs.values()):
-        facts.add("crosswalk")
-    if any(leg.sign for leg in roads.legs.values()) or roads.signals != "none":
-        facts.add("regulatory sign")
-    return facts
-
-
-def _quantities_of_roads(roads: RoadsSpec) -> dict[str, Measure]:
-    knobs = roads.knobs
-    found = {
-        "lane_width": Measure((knobs["lane_width"],), _same),
-        # in whole km/h: 13.9 m/s stand for 50 km/h
-        "speed_limit": Measure((knobs["speed_limit"],), lambda v: np.rint(_KMH * v)),
-        "grade": Measure((knobs.get("grade", 0.0),), _same),
-    }
-    lanes = next((knobs[name] for name in ("lanes", "lanes_per_direction") if name in knobs), None)
-    if lanes is not None:
-        found["lanes"] = Measure((lanes,), _same)
-    if roads.template == "roundabout":
-        measures = (knobs["radius"], knobs["ring_lane_width"])
-        found["roundabout_diameter"] = Measure(measures, lambda r, width: 2.0 * r + width)
-        return found
-    bends = [name for each in roads.segments for name in (each.curvature, each.end_curvature)]
-    found["curve_radius"] = Measure((0.0, *bends), _radius)
-    return found
-
-
-def _same(x: Float) -> Float:
-    return x
-
-
-def _radius(*curvatures: Float) -> Float:
-    """Return the radius of the tightest bend [m]; inf where there is none."""
-    tightest = reduce(np.maximum, map(np.abs, curvatures))
-    with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / tightest)
 
 
 # ---- scenario files ----
@@ -277,7 +153,7 @@ def _of_file(scenario: FileScenario) -> set[str]:
     for obj in scenario.storyboard.entities.scenario_objects:
         kind = kind_of(obj.entity_object) if str(obj.name).lower() != "ego" else None
         if kind is not None and kind.takes_part:
-            facts.add(f"participant:{_kind(kind.name)}")
+            facts.add(f"participant:{kind_of_participant(kind.name)}")
     return facts | _facts_of_map(scenario.roads.model)
 
 
@@ -306,9 +182,9 @@ def _facts_of_lanes(road: Road) -> set[str]:
 # --- The sceneries of a project: each scenario is read once, whatever number of results it has ---
 
 
-Source = tuple[str, str, str, bool]
-"""Source of a scenario: path or name, distribution, reading of empty triggers ("" for none),
-whether it is on a map."""
+Source = tuple[str, str, str, bool, str]
+"""Source of a scenario: path or name, distribution, reading of empty triggers, whether it is on a
+map, and the ODD that bounds it, as JSON; "" for none."""
 
 
 class Sceneries:
@@ -335,14 +211,15 @@ class Sceneries:
         """Return all that were read, by the names that results have their scenarios under."""
         return {
             scenario_name(text, project, distribution): known[0]
-            for (text, distribution, _, _), known in self._known.items()
+            for (text, distribution, *_), known in self._known.items()
             if known is not None
         }
 
     def _read(self, source: Source) -> tuple[Scenery, str] | None:
-        text, distribution, trigger, on_map = source
+        text, distribution, trigger, on_map, odd = source
         try:
             scenario = load(text, distribution or None, trigger or None)
+            scenario = within(scenario, json.loads(odd) if odd else None, text if on_map else None)
             return scenery_of(scenario, on_map=on_map), scenario.fingerprint
         except (BridgeGenError, OSError, ValueError):  # ValueError: NUL in a path
             return None

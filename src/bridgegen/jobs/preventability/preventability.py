@@ -20,7 +20,7 @@ from bridgegen.jobs.preventability.grid import Grid, grid_of
 from bridgegen.jobs.preventability.options import MapOptions
 from bridgegen.jobs.preventability.pictures import cell_pictures
 from bridgegen.jobs.preventability.result import ChunkStore, PreventabilityMap, simulated
-from bridgegen.jobs.search.scenarios import driven_by, load
+from bridgegen.jobs.search.scenarios import driven_by, load, within
 from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.simulation import vehicles
 
@@ -48,7 +48,7 @@ def map_preventability(given: MapOptions) -> PreventabilityMap:
             egos.get(name)
     if vehicle is not None:
         vehicles.require(vehicle)
-    logical = driven_by(load(given.scenario), given.others)
+    logical = within(driven_by(load(given.scenario), given.others), given.odd)
     if any(name in arithmetic.NAMES for name in (*drivers, *judges)):
         arithmetic.require(logical.name)
     space = logical.space(fixed=dict(given.fixed))
@@ -66,6 +66,7 @@ def map_preventability(given: MapOptions) -> PreventabilityMap:
         "drivers": list(drivers),
         "models": list(judges),
         **({"vehicle": vehicle} if vehicle else {}),
+        **({} if logical.odd is None else {"odd": logical.odd.odd.to_record()}),
         # A map may be resumed long after: a driver whose file has changed since would give another
         # map.
         "files of drivers": {name: digest_of(name) or None for name in names},

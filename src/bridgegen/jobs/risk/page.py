@@ -66,6 +66,8 @@ def facts(risk: Risk) -> Iterator[str]:
     yield f"method {risk.estimated.method}"
     yield f"{percent(risk.exposure.feasible_share.estimate)} of the exposure keep the constraints"
     yield f"seed {risk.seed}"
+    if risk.exposure.scenario.odd is not None:
+        yield f"{risk.exposure.scenario.odd.label}: per encounter inside it"
 
 
 def unsure(risk: Risk) -> Iterator[str]:
@@ -97,6 +99,7 @@ def unsure(risk: Risk) -> Iterator[str]:
         yield data_sentence(risk.data)
     else:
         yield "Few data: the exposure's numbers are taken as they are."
+    yield risk.exposure.left_out
     yield f"Where the exposure comes from: {risk.exposure.source}"
     yield (
         "The simulation: drivers, participants, sensors and friction are those of the embedded "

@@ -213,11 +213,15 @@ class Risk:
     def to_dict(self) -> dict[str, Any]:
         """Return what ``risk.json`` says."""
         exposure, weighted = self.exposure, self.weighted
-        share = exposure.feasible_share
+        share, twins = exposure.feasible_share, exposure.parameterisation
         return {
             "scenario": exposure.scenario.name,
             "driver": self.driver,
-            "exposure": {"source": exposure.source, "feasible_share": share.estimate},
+            "exposure": {
+                "source": exposure.source,
+                "feasible_share": share.estimate,
+                "parameterisation": twins.figures() if twins else None,
+            },
             "event": self.event,
             "count": self.count,
             "method": self.estimated.method,

@@ -36,7 +36,7 @@ from bridgegen.jobs.risk.outcomes import require as require_event
 from bridgegen.jobs.risk.result import Likely, Risk
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.scenario_files import write_scenario
-from bridgegen.jobs.search.scenarios import driven_by, load
+from bridgegen.jobs.search.scenarios import driven_by, load, within
 from bridgegen.pages.moving import moving_picture
 from bridgegen.pages.scenery import Scenery
 from bridgegen.results.store import Store
@@ -195,8 +195,19 @@ def estimate_risk(given: RiskOptions) -> Risk:
         raise InputError(
             f"a risk is that of a logical scenario (.yaml) with an exposure, got {given.scenario}"
         )
-    driven = cast(LogicalScenario, driven_by(logical, given.others))
+    driven = cast(LogicalScenario, within(driven_by(logical, given.others), given.odd))
     met = _exposure(driven, given.exposure)
+    if driven.odd is not None:
+        # Hours and kilometres count encounters outside the ODD, too, of which nothing is simulated.
+        met = replace(met, encounters=None)
+        for name, marginal in met.marginals.items():
+            before, now = logical.parameters[name], driven.parameters[name]
+            # A beta distribution is of its range: over a narrower one it would be another.
+            if (before.low, before.high) != (now.low, now.high) and "Beta" in repr(marginal):
+                raise InputError(
+                    f"{name} has a beta distribution over its range, which the ODD narrows to "
+                    f"{now.low:g} to {now.high:g} {now.unit}: state another distribution"
+                )
     if met.dimensions == 0:
         raise InputError(
             f"the exposure of {driven.name} distributes no parameter: nothing is random"
@@ -228,6 +239,7 @@ def estimate_risk(given: RiskOptions) -> Risk:
             "check": check,
             "start": None if Z is None else hashlib.sha256(Z.tobytes()).hexdigest(),
             "events": None if fitted is None else fitted.used,
+            **({} if driven.odd is None else {"odd": driven.odd.odd.to_record()}),
         }
         there = None
         if elsewhere is not None:

@@ -48,6 +48,8 @@ def lines(risk: Risk) -> Iterator[str | Table]:
         rows.append(row)
     head = ("", "per encounter", "95 %", "below (95 %)", "effective rows")
     yield Table((*head, *(f"per {unit}" for unit in units)), rows)
+    if (odd := risk.exposure.scenario.odd) is not None:
+        yield f"{odd.label}: probabilities are per encounter inside it; rates are not known"
     for doubt in risk.weighted.doubts:
         yield f"\ndoubt       {doubt}"
     yield f"\n{'method':<12}{risk.estimated.method}: {risk.estimated.why}"
@@ -56,6 +58,7 @@ def lines(risk: Risk) -> Iterator[str | Table]:
         yield f"{'check':<12}{value} ({width}) in {risk.check.evaluations:,} by mc"
     if risk.data is not None:
         yield f"{'data':<12}{data_sentence(risk.data)}"
+    yield f"{'parameters':<12}{risk.exposure.left_out}"
     if risk.elsewhere is not None:
         yield f"{'elsewhere':<12}{elsewhere_sentence(risk.elsewhere)}"
     yield f"{'page':<12}{risk.folder / PAGE}"

@@ -12,8 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.assess.metrics import about
-from bridgegen.base.arrays import Int
-from bridgegen.base.errors import InputError, Interrupted, StorageError, WorkersError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import (
+    BridgeGenError,
+    InputError,
+    Interrupted,
+    StorageError,
+    WorkersError,
+)
 from bridgegen.base.plugins import file_of, is_own
 from bridgegen.drivers import STORYBOARD
 from bridgegen.drivers.identity import digest_of
@@ -35,6 +41,7 @@ from bridgegen.jobs.search.scenarios import (
     is_file,
     load,
     refuse_standstill,
+    within,
 )
 from bridgegen.jobs.search.screening import BATCH, require_screen, screen_budget
 from bridgegen.jobs.search.searcher import FailingDriver, require_asynchronous, searcher_of
@@ -44,6 +51,7 @@ from bridgegen.openx.opendrive.site_adapted import adapted
 from bridgegen.openx.opendrive.site_fit import ALL
 from bridgegen.pages.data import WHOLE
 from bridgegen.results.store import Recorded, Store, refuse_used
+from bridgegen.results.validated import extrapolated, regions_beside
 from bridgegen.scenario.language.adversary import adversarial
 from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
@@ -124,6 +132,7 @@ def run_search(given: SearchArguments) -> Run:
     catalogue = driven_by(
         load(given.scenario, given.distribution, given.empty_trigger), given.others
     )
+    catalogue = within(catalogue, given.odd, given.road_map)
     budget = catalogue.budget if given.budget is None else given.budget
     seed = catalogue.seed if given.seed is None else given.seed
     if problems := range_problems(replace(given, budget=budget, seed=seed)):
@@ -378,9 +387,11 @@ def _finish(
             effort=effort(settings.triage),
             domain=store.domain,
         )
-        record = triaged.record
         if rule != "criteria":
             best = np.array(triaged.exports, dtype=np.int64)
+        found, said = _extrapolated(pipeline, rows.X[best], store.folder, settings, callbacks)
+        beyond = tuple(best[found].tolist())
+        record = triaged.record.model_copy(update={"beyond": beyond, "extrapolated": said})
         write_record(store.folder, record)
     callbacks.stage("export")
     chosen = rows.take(best)
@@ -396,6 +407,22 @@ def _finish(
     there = np.flatnonzero(np.isin(best, [item.evaluation for item in exported]))
     write_run_report(pipeline, run, rows, exported, replays.take(there) if replays else None)
     return run
+
+
+def _extrapolated(
+    pipeline: Pipeline, X: Float, folder: Path, settings: Settings, callbacks: SearchCallbacks
+) -> tuple[Int, str]:
+    """Return which findings lie outside the region that a dossier beside the run calls validated.
+
+    A dossier that is damaged is a warning: what was searched does not depend on it.
+    """
+    try:
+        regions = regions_beside(folder)
+    except BridgeGenError as error:
+        callbacks.warning("; ".join(error.problems))
+        regions = []
+    of = settings.fingerprint, str(settings.vehicle), pipeline.space.names
+    return extrapolated(regions, *of, X)
 
 
 def _critical_by_objective(rows: Recorded, keep: int) -> Int:

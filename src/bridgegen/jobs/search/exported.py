@@ -156,7 +156,9 @@ def exported_scenarios(folder: Path, evaluations: int | None = None) -> tuple[Ex
         row = _read(path, _Origin).row
         if evaluations is not None and row >= evaluations:
             raise _not_written(path, f"the run has no evaluation {row + 1}")
-        files = (path.with_suffix(f".{kind}") for kind in ("owl", "xodr", "xosc", "json"))
+        files = (
+            path.with_suffix(f".{kind}") for kind in ("owl", "xodr", "xosc", "cod.yaml", "json")
+        )
         names = tuple(f"{FOLDER}/{file.name}" for file in files if file.is_file())
         kept.append(Exported(path.stem, row, names))
     return tuple(kept)

@@ -18,7 +18,7 @@ from bridgegen.engine.options import CommonOptions, called_with
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.simulate import FileResult, measured, result_of
 from bridgegen.jobs.search.restored import placed
-from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load
+from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load, within
 from bridgegen.pages.sketch import sketch
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
@@ -61,6 +61,7 @@ def model(given: ModelArguments) -> "Model":
 def _pipeline_of(given: ModelArguments, *, held: bool = False) -> Pipeline:
     """Return the pipeline of a scenario; ``held``: every parameter stands at its value."""
     logical = driven_by(load(given.scenario, given.distribution, given.empty_trigger), given.others)
+    logical = within(logical, given.odd, given.road_map)
     spec = chosen_objective(logical.objective, given, "one")
     logical = as_judged(replace(logical, objective=spec), spec.gated)
     logical, roads = placed(logical, given.road_map, given.junction)

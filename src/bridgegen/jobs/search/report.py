@@ -27,6 +27,9 @@ from bridgegen.search.triage.record import Triage
 from bridgegen.search.triage.record import read_record as read_triage
 from bridgegen.simulation.choice import EMBEDDED
 
+SENSITIVITY = "sensitivity.html"
+"""File of a run's folder: the page of the sensitivity of its verdicts."""
+
 MOST_SENT = 1_000_000
 """Maximum length of a page that is sent [bytes]: what any mail and any tracker takes."""
 
@@ -211,6 +214,8 @@ def run_data(
         drawn=failing_draws(pipeline.space, triage, max(settings.keep, 1)),
         further_files=further_files(folder),
         files=files, more=more, happening=run.happening,
+        # A page that is served or sent has no files beside it.
+        beside=(SENSITIVITY,) if more and (folder / SENSITIVITY).is_file() else (),
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Workers
 from bridgegen.jobs.search.run import Run
-from bridgegen.jobs.search.scenarios import as_judged, driven_by, load
+from bridgegen.jobs.search.scenarios import as_judged, driven_by, load, within
 from bridgegen.jobs.search.settings import Settings
 from bridgegen.openx.on_map import on_map, searchable
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
@@ -179,7 +179,7 @@ def searched(run: Run) -> tuple[SearchedScenario, SearchSpace, RoadMap | None]:
     """
     settings, folder = run.settings, run.folder
     read = load(settings.scenario, settings.distribution, settings.empty_trigger)
-    logical = driven_by(read, settings.others)
+    logical = within(driven_by(read, settings.others), settings.odd, settings.road_map)
     # The scenarios of the paper had its objective by default; a run's own is in its settings.
     earlier = replace(logical, objective=PAPERS)
     if settings.fingerprint not in (logical.fingerprint, earlier.fingerprint):

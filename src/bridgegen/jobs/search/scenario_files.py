@@ -24,6 +24,7 @@ from bridgegen.openx.openscenario.declarations import (
 from bridgegen.openx.openscenario.from_owl.notes import FINDINGS
 from bridgegen.openx.openscenario.values import format_double
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
+from bridgegen.scenario.odd.domain import cod
 from bridgegen.scenario.ontology.check import check
 from bridgegen.scenario.ontology.files import save
 from bridgegen.scenario.ontology.graph import Individuals
@@ -44,6 +45,8 @@ def write_scenario(
     conflict: ConflictSummary | None = None,
 ) -> list[Path]:
     """Write one row as ``name.owl``, ``name.xodr`` and ``name.xosc``; return their paths.
+
+    A scenario that an ODD bounds has its current operational domain beside it, ``name.cod.yaml``.
 
     The ontology also holds the outcomes of the scenario's rollout (``has_outcome``), its cause, if
     it is known (``has_cause``), and type, responsibility and severity of its decisive conflict; the
@@ -81,10 +84,16 @@ def write_scenario(
     storyboard = _with_header(concrete.storyboard, cause, conflict)
     storyboard = with_vehicle(storyboard, pipeline.runner.vehicle)
     xosc.write_bytes(scenario_xml(keyed(storyboard, noise) if noise else storyboard))
+    files = [xodr, xosc]
+    if pipeline.scenario.odd is not None:
+        files.append(folder / f"{name}.cod.yaml")
+        files[-1].write_text(
+            cod(pipeline.scenario.odd, pipeline.space.values(x), xosc.name), encoding="utf-8"
+        )
     if individuals is None:
-        return [xodr, xosc]
+        return files
     save(individuals, owl)
-    return [owl, xodr, xosc]
+    return [owl, *files]
 
 
 def _with_header(

@@ -1,5 +1,6 @@
 """What can be searched, and the objective as options change it."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn, cast, get_args
@@ -8,7 +9,7 @@ from bridgegen.assess.conflict.harm import Count
 from bridgegen.assess.conflict.quantities import HARM, QUANTITIES
 from bridgegen.assess.metrics import read
 from bridgegen.assess.objective import RULES, Objectives
-from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.base.errors import InputError, UnknownNameError, UnsupportedError
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.forms import read_names
 from bridgegen.openx.file_scenario import FileScenario, load_file_scenario, with_triggers
@@ -100,6 +101,37 @@ def driven_by(scenario: SearchedScenario, others: str | None) -> SearchedScenari
         able = (program.names[e] for e in program.attends.tolist())
         return drive_file_by(scenario, dict.fromkeys(able, others))
     return scenario
+
+
+def within(
+    scenario: SearchedScenario,
+    odd: Mapping[str, Any] | Path | str | None,
+    road_map: Path | str | None = None,
+) -> SearchedScenario:
+    """Return a scenario bounded by an operational design domain.
+
+    Args:
+        scenario: of any kind.
+        odd: its file's path, or what the option ``odd`` keeps of it; None: unbounded.
+        road_map: on which the scenario is placed; its roads are then not read.
+
+    Raises:
+        FileFormatError: it is damaged, or has a unit of another dimension.
+        ScenarioError: it excludes every row.
+        UnsupportedError: a scenario file, of whose attributes too little is read.
+    """
+    if odd is None:
+        return scenario
+    from bridgegen.scenario.odd.bounding import bounded
+    from bridgegen.scenario.odd.reader import odd_of, read_odd
+
+    if not isinstance(scenario, LogicalScenario):
+        raise UnsupportedError(
+            f"{scenario.name}: an ODD bounds scenarios of YAML; of an OpenSCENARIO file, weather "
+            "and speeds are not read"
+        )
+    read = odd_of(odd) if isinstance(odd, Mapping) else read_odd(odd)
+    return bounded(scenario, read, on_map=road_map is not None)
 
 
 def refuse_standstill(scenario: SearchedScenario) -> NoReturn:

@@ -14,6 +14,7 @@ from bridgegen.engine.constants import NOT_VARIED, Constant, applying, try_with
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.trials import Trials
 from bridgegen.engine.workers import Threads
+from bridgegen.jobs.search.report import SENSITIVITY, rewrite_report
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.jobs.search.run import REPORT, Run
 from bridgegen.pages import charts, templates
@@ -28,9 +29,6 @@ from bridgegen.search.sensitivity import (
 )
 from bridgegen.search.triage.moves import nearest, reaches, searched
 from bridgegen.search.triage.neighbours import RADIUS
-
-PAGE = "sensitivity.html"
-"""File of the page in a run's folder."""
 
 FINDINGS, BUDGET = 20, 10_000
 """Findings that are analysed, and evaluations, at most."""
@@ -156,7 +154,8 @@ def sensitivity_of(
         left_out=len(titles) - int(bench.base.harmful.sum()),
     )
     record.write_record(run.folder / JSON_FILE, found)
-    _write_page(run.folder / PAGE, found)
+    _write_page(run.folder / SENSITIVITY, found)
+    rewrite_report(run, pipeline, lambda stage: None)
     return found
 
 

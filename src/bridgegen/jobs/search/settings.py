@@ -28,8 +28,8 @@ CHOSEN = ("objective", "weights", "scale", "objectives", "count", "metrics")
 
 OF_DRIVER = ("ego", "ideal")
 OF_ROW = (
-    "distribution", "empty_trigger", "road_map", "junction", "objective", "critical", "others",
-    "vehicle",
+    "distribution", "empty_trigger", "odd", "road_map", "junction", "objective", "critical",
+    "others", "vehicle",
 )  # fmt: skip
 """The options on which the motion of a row depends, besides its values."""
 
@@ -72,6 +72,7 @@ class Settings(SearchOptions):
     optimised: Mapping[str, Any]
     own_metrics: Sequence[Mapping[str, str | float]] = ()
     driver_digest: str = ""
+    odd: Mapping[str, Any] | None = None
 
     @property
     def called(self) -> str:
@@ -83,6 +84,8 @@ class Settings(SearchOptions):
         plain = {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
         if not self.own_metrics:
             del plain["own_metrics"]  # as in runs of earlier versions
+        if self.odd is None:
+            del plain["odd"]
         chosen = {name: plain.pop(name) for name in CHOSEN}
         plain["simulator_settings"] = dict(self.simulator.settings)
         plain["simulator"] = self.simulator.name

@@ -15,8 +15,9 @@ from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads
-from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load
+from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load, within
 from bridgegen.jobs.suite.clauses import judged
+from bridgegen.jobs.suite.drawn import Draw, drawn
 from bridgegen.jobs.suite.entries import Entry
 from bridgegen.jobs.suite.results import EntryResult, GridResult, RowResult, finite
 from bridgegen.jobs.suite.rows import Rows, is_sample, rows_of
@@ -35,8 +36,8 @@ IMPACT = ("impact_speed", "relative_impact_speed", "speed_reduction")
 
 QUANTITIES = ("harm", "severity", "n_collision", "d_min", *IMPACT)
 
-MATRIX = "matrix"
-"""The column that names a row's grid."""
+MATRIX, DRAWN = "matrix", "drawn"
+"""The columns that name a row's grid, and where an assessor drew it."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ class Job:
         seed: of samples.
         edition: of a logical scenario's matrix; None: all, "none": samples instead.
         only: the number of the one row that is run, from 0 on; None: all.
+        draw: what an assessor's key draws in place of these rows.
     """
 
     entry: Entry
@@ -62,6 +64,7 @@ class Job:
     seed: int
     edition: str | None = None
     only: int | None = None
+    draw: Draw | None = None
 
     @property
     def driver_digest(self) -> str:
@@ -102,16 +105,26 @@ def evaluate(job: Job) -> EntryResult:
         return found.model_copy(update={"problem": str(error)})
 
 
+def scenario_of(job: Job) -> SearchedScenario:
+    """Return the scenario of an entry, within the operational design domain if one is given.
+
+    Raises:
+        InputError: the files cannot be read, or nothing of it lies in that domain.
+    """
+    entry = job.entry
+    is_file = entry.scenario.lower().endswith(".xosc")
+    trigger = job.options.empty_trigger if is_file else None
+    scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
+    return within(scenario, job.options.odd)
+
+
 def pipeline_of(job: Job) -> Pipeline:
     """Return the pipeline of an entry, ready to evaluate.
 
     Raises:
         InputError: the files cannot be read or run.
     """
-    entry = job.entry
-    is_file = entry.scenario.lower().endswith(".xosc")
-    trigger = job.options.empty_trigger if is_file else None
-    scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
+    entry, scenario = job.entry, scenario_of(job)
     options = replace(
         job.options,
         ego=job.ego,
@@ -148,7 +161,11 @@ def rows_of_job(job: Job, pipeline: Pipeline) -> np.ndarray:
 
 def _rows_of(job: Job, pipeline: Pipeline) -> Rows:
     """Return what is run of an entry."""
-    found = rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed, job.edition)
+    scenario, space = pipeline.scenario, pipeline.space
+    if job.draw is not None:
+        found = drawn(scenario, space, job.draw, job.entry.digest)
+    else:
+        found = rows_of(scenario, space, job.samples, job.seed, job.edition)
     if job.only is None:
         return found
     if not 0 <= job.only < len(found.X):
@@ -157,7 +174,7 @@ def _rows_of(job: Job, pipeline: Pipeline) -> Rows:
             f"{job.only + 1}"
         )
     at = slice(job.only, job.only + 1)
-    return replace(found, X=found.X[at], grid=found.grid[at], excluded=0)
+    return replace(found, X=found.X[at], grid=found.grid[at], strata=found.strata[at], excluded=0)
 
 
 def _evaluated(job: Job, found: EntryResult) -> EntryResult:
@@ -168,7 +185,8 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     notes = [*pipeline.scenario.notes, *pipeline.runner.notes]
     if given.excluded:
         notes.append(
-            f"{given.excluded} combinations are excluded by the scenario's own constraints"
+            f"{given.excluded} {'draws' if given.strata else 'combinations'} are excluded by the "
+            "scenario's own constraints"
         )
     rows, texts = list[RowResult](), list[str]()
     for start in range(0, len(X), AT_ONCE):
@@ -182,18 +200,19 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     if job.entry.is_failure:  # it is about that conflict: one that stops for it has met it
         happening = replace(happening, stuck=0)
     units = dict(zip(space.names, space.units, strict=True))
-    labels = [grid.label for grid in given.grids]
+    labels = given.strata or [given.grids[number].label for number in given.grid]
     if labels:
         rows = [
-            row.model_copy(update={"x": [labels[number], *row.x]})
-            for row, number in zip(rows, given.grid, strict=True)
+            row.model_copy(update={"x": [label, *row.x]})
+            for row, label in zip(rows, labels, strict=True)
         ]
+    named = [DRAWN if given.strata else MATRIX] if labels else []
     return found.model_copy(
         update={
             "driver": pipeline.driver.label,
             "title": pipeline.scenario.title,
-            "parameters": [*([MATRIX] if labels else []), *_shown(names, space)],
-            "units": [*(["1"] if labels else []), *(units[name] for name in names)],
+            "parameters": [*named, *_shown(names, space)],
+            "units": [*("1" for _ in named), *(units[name] for name in names)],
             "grids": [
                 GridResult(
                     label=grid.label,
@@ -228,32 +247,40 @@ def _shown(names: Sequence[str], space: SearchSpace) -> list[str]:
     return made
 
 
-def _rows(
-    pipeline: Pipeline, X: np.ndarray, evaluation: Evaluation, names: Sequence[str]
-) -> list[RowResult]:
-    space = pipeline.space
+def written(
+    scenario: SearchedScenario, space: SearchSpace, X: np.ndarray, names: Sequence[str]
+) -> list[list[float | str]]:
+    """Return the values of some columns of rows as results have them."""
     columns = [space.index(name) for name in names]
     parameters: list[Parameter | None] = [space.parameters.get(name) for name in names]
-    scenario = pipeline.scenario
     of_file = scenario.texts if isinstance(scenario, FileScenario) else {}
-    metrics = {name: evaluation.metrics[:, pipeline.metrics.index(name)] for name in QUANTITIES}
-    margins = [
-        evaluation.metrics[:, pipeline.metrics.index(item)] for item in pipeline.monitor.names
-    ]
-    unsafe = is_unsafe_start(evaluation.findings, metrics["harm"])
-    rows = []
-    for i in range(len(X)):
+    made = []
+    for row in X.tolist():
         x: list[float | str] = []
         for name, column, parameter in zip(names, columns, parameters, strict=True):
-            value = float(X[i, column])
+            value = row[column]
             if name in of_file:  # of a set of values, too, which has no parameter of its own
                 x.append(of_file[name][round(value)])
                 continue
             if isinstance(parameter, FileParameter) and parameter.is_set:
                 x.append(f"{round(value) + 1} of {round(parameter.high) + 1}")
                 continue
-            written = value if parameter is None else parameter.kind.written(value)
-            x.append(written if isinstance(written, str) else float(written))
+            text = value if parameter is None else parameter.kind.written(value)
+            x.append(text if isinstance(text, str) else float(text))
+        made.append(x)
+    return made
+
+
+def _rows(
+    pipeline: Pipeline, X: np.ndarray, evaluation: Evaluation, names: Sequence[str]
+) -> list[RowResult]:
+    metrics = {name: evaluation.metrics[:, pipeline.metrics.index(name)] for name in QUANTITIES}
+    margins = [
+        evaluation.metrics[:, pipeline.metrics.index(item)] for item in pipeline.monitor.names
+    ]
+    unsafe = is_unsafe_start(evaluation.findings, metrics["harm"])
+    rows = []
+    for i, x in enumerate(written(pipeline.scenario, pipeline.space, X, names)):
         if evaluation.status[i]:
             text = STATUS_MESSAGES[int(evaluation.status[i])]
             more = evaluation.messages.get(i, "")

@@ -126,6 +126,7 @@ class Failing:
         metrics: as recorded, by name; empty where they are not.
         minimal: runs its minimal form, if there is one.
         needs: what that needs, in words.
+        note: what makes the verdict doubtful; "" if nothing is known to.
     """
 
     source: str
@@ -137,6 +138,7 @@ class Failing:
     metrics: Mapping[str, float] = field(default_factory=dict)
     minimal: Job | None = None
     needs: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -225,6 +227,7 @@ def _of_run(
             scenario=scenario,
             found=f"search by {settings.algorithm}, {found}",
             seed=settings.seed,
+            note=run.triage.doubts(exported.get(name, -1)) if run.triage else "",
         )
 
     scenario = searched_scenario(run.triage.scenario, settings.road_map)

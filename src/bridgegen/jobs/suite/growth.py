@@ -171,7 +171,7 @@ def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str, bo
         _Refused: it does not fail there as it did.
         StorageError: the folder cannot be written.
     """
-    stage, notes = to / _STAGING, []
+    stage, notes = to / _STAGING, [found.note] if found.note else []
     files, needs = [f"{id}.xosc"], "" if found.minimal else found.needs
     try:
         shutil.rmtree(stage, ignore_errors=True)
@@ -206,6 +206,7 @@ def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str, bo
         place=key.place,
         cause=key.cause,
         minimal=_cut(needs),
+        note=found.note,
         violates=[CriterionSection.model_validate(violated) for violated in way.violates],
         count="any" if found.job.options.count == "any" else "ego",
         driver=_cut(way.driver),

@@ -145,8 +145,9 @@ def words(standing: Standing, failure: tuple[str, Failure] | None) -> str:
     """Return how a failing entry stands, where an index names it."""
     if failure is None or standing in ("passed", "not run", "not judged"):
         return ""
+    note = f", {failure[1].note}" if failure[1].note else ""
     if standing == "regression":
-        return "regression: it was fixed"
+        return f"regression: it was fixed{note}"
     if standing == "new" and failure[1].status != "new":
         return f"new: not the {failure[1].status} failure"
-    return f"{standing} failure"
+    return f"{standing} failure{note}"

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.base.errors import ScenarioError
 from bridgegen.drivers.identity import digest_of
 from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.jobs.preventability.classes import CellClass
@@ -14,7 +15,7 @@ from bridgegen.jobs.preventability.grid import coarse_axes
 from bridgegen.jobs.preventability.page import COLOURS, data_uri
 from bridgegen.jobs.preventability.preventability import map_preventability
 from bridgegen.jobs.preventability.result import PreventabilityMap
-from bridgegen.jobs.search.scenarios import driven_by, load
+from bridgegen.jobs.search.scenarios import driven_by, load, within
 from bridgegen.jobs.suite.suite import SuiteRun
 from bridgegen.scenario.language.scenario import LogicalScenario
 
@@ -50,7 +51,11 @@ def map_suite(
         if name.lower().endswith(".xosc"):
             continue
         others = suite.settings["others"]
-        scenario = driven_by(load(name), others)
+        odd = suite.settings.get("odd")
+        try:
+            scenario = within(driven_by(load(name), others), odd)
+        except ScenarioError:
+            continue  # outside the ODD, as its entry says
         assert isinstance(scenario, LogicalScenario)
         axes = coarse_axes(scenario.name, scenario.space(), MOST_CELLS)
         if axes is None:
@@ -62,6 +67,7 @@ def map_suite(
                 list(egos),
                 grid=axes,
                 others=others,
+                odd=odd,
                 out=suite.folder / FOLDER / _folder(scenario, list(egos)),
                 callbacks=callbacks or JobCallbacks(),
             )

@@ -9,7 +9,7 @@ from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.forms import FLAG, PATH, TEXT, WHOLE
 from bridgegen.engine.options.forms import SIMULATOR as CHOICE
 from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, SIMULATOR, WHAT, option
-from bridgegen.engine.options.search import MAX_BUDGET
+from bridgegen.engine.options.search import MAX_BUDGET, OF_ODD
 from bridgegen.jobs.frame import DRIVERS, SCENARIOS, Job, SimulatingOptions
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 
@@ -61,6 +61,7 @@ class ScenariosOptions(SimulatingOptions):
     critical: str | None = field(default=None, metadata=_of_search("critical"))
     count: str | None = field(default=None, metadata=_of_search("count"))
     empty_trigger: str | None = field(default=None, metadata=_of_search("empty_trigger"))
+    odd: Mapping[str, Any] | Path | str | None = field(default=None, metadata=OF_ODD)
     matrix: str | None = field(
         default=None,
         metadata=option(
@@ -127,6 +128,14 @@ class SuiteOptions(ScenariosOptions):
         ),
     )
     driver_name: str | None = field(default=None, metadata=_of_search("driver_name"))
+    assessor: Path | None = field(
+        default=None,
+        metadata=option(
+            PATH,
+            "Run what an assessor's key ('suite commit') draws instead, and seal the result.",
+            group=SEARCH,
+        ),
+    )
     with_maps: bool = field(
         default=False,
         metadata=option(

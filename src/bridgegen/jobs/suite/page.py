@@ -37,7 +37,7 @@ PLAYED = ("broken", "fixed", "worse", "milder")
 
 _MODULE = "suite.js"
 
-_SIMULATE = ("ideal", "vehicle", "others", "time_limit", "criteria", "empty_trigger")
+_SIMULATE = ("ideal", "vehicle", "others", "time_limit", "criteria", "empty_trigger", "odd")
 """Options that ``bridgegen simulate`` has, too."""
 
 

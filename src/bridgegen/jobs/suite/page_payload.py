@@ -5,6 +5,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from bridgegen.base.physics import HARD_BRAKING
@@ -141,6 +142,7 @@ def payload(
             ],
             "outcomes": [
                 [text for text in (outcomes(suite.of_ego(ego)), points(suite.of_ego(ego))) if text]
+                + suite.drawn_lines(ego)
                 for ego in suite.egos
             ],
             "differences": differences([group for group in complete if len(group) > 1], labels),
@@ -368,6 +370,8 @@ def _facts(suite: SuiteRun) -> list[str]:
     facts = [f"simulator {s['simulator']}"] if s.get("simulator", "embedded") != "embedded" else []
     for name in ("critical", "count", "others", "empty_trigger"):
         facts += [f"{name.replace('_', ' ')}: {s[name]}"] if s.get(name) else []
+    if odd := s.get("odd"):
+        facts.append(f"operational design domain {Path(odd['path']).name}")
     facts += [f"ideal {', '.join(map(str, s['ideal']))}"] if s.get("ideal") else []
     facts += [f"seed {s['seed']}"] if s.get("seed") else []
     for ego, label in zip(suite.egos, suite.labels, strict=True):

@@ -14,6 +14,7 @@ from bridgegen.drivers import is_spec
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.jobs.suite.drawn import Draw
 from bridgegen.jobs.suite.entries import RESULTS, VARIATIONS, Entry, indexed
 from bridgegen.jobs.suite.evaluate import Job, evaluate, pipeline_of, rows_of_job
 from bridgegen.jobs.suite.results import EntryResult, RowResult, Strict
@@ -39,6 +40,8 @@ class _Settings(Strict):
     matrix: str | None = None
     vehicle: str | None = None
     driver_name: str | None = None
+    secret: str | None = None
+    drawn: int = 0
     version: str
 
 
@@ -203,6 +206,7 @@ def job_of(suite: SuiteRun, result: EntryResult, simulator: SimulatorChoice | No
         settings.samples,
         settings.seed,
         settings.matrix,
+        draw=Draw(settings.secret, settings.drawn) if settings.secret else None,
     )
 
 

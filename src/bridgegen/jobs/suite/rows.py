@@ -39,6 +39,7 @@ class Rows:
         excluded: number of combinations that the scenario's own constraints exclude.
         grids: of the matrix that it runs; empty: none.
         grid: ``(N,)`` which of them each row belongs to.
+        strata: ``(N,)`` where an assessor drew each row; empty: none did.
     """
 
     X: Float
@@ -46,6 +47,7 @@ class Rows:
     excluded: int
     grids: tuple[Grid, ...] = ()
     grid: tuple[int, ...] = ()
+    strata: tuple[str, ...] = ()
 
 
 def matrix_of(scenario: SearchedScenario, edition: str | None) -> tuple[Grid, ...]:

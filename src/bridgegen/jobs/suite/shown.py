@@ -12,7 +12,7 @@ from bridgegen.jobs.suite.difference import DriverDifference
 from bridgegen.jobs.suite.known_failures import words as known_words
 from bridgegen.jobs.suite.results import EntryResult, counts
 from bridgegen.jobs.suite.sentences import clause_in_words, outcomes, points, points_of
-from bridgegen.jobs.suite.suite import SuiteRun
+from bridgegen.jobs.suite.suite import SEALED, SuiteRun
 
 MOST_MODES = 3
 """Largest number of failure modes of a search that are named."""
@@ -62,6 +62,7 @@ def json_of_suite(suite: SuiteRun) -> dict[str, Any]:
             }
             for map_ in suite.maps
         ],
+        **({"sealed": suite.sealed.model_dump(exclude={"results"})} if suite.sealed else {}),
     }
 
 
@@ -95,6 +96,8 @@ def suite_shown(suite: SuiteRun) -> list[str | Table]:
     if gone := suite.known_failures.gone(suite.results):
         found.append(f"no longer fail, set their status to fixed: {', '.join(gone)}")
     found += [f"map         {map_.page}" for map_ in suite.maps]
+    if suite.sealed is not None:
+        found += [f"sealed      {suite.folder / SEALED}", f"seal        {suite.sealed.seal}"]
     return [*found, f"page        {suite.page}"]
 
 
@@ -112,7 +115,8 @@ def _totals(suite: SuiteRun, ego: str, label: str) -> Iterator[str]:
         + f"{number['not run']} did not run"
     )
     sentence = suite.known_failures.sentence(results)
-    for text in filter(None, (outcomes(results), points(results), sentence)):
+    said = (outcomes(results), points(results), sentence, *suite.drawn_lines(ego))
+    for text in filter(None, said):
         yield f"  {text}"
     for id in suite.known_failures.regressions(results):
         yield f"  regression: {id} was fixed, and fails again"

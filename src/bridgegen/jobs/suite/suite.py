@@ -21,6 +21,7 @@ from bridgegen.engine.options import called_with, range_problems
 from bridgegen.engine.workers.processes import cores
 from bridgegen.engine.workers.tasks import TaskPool
 from bridgegen.jobs import frame
+from bridgegen.jobs.suite.drawn import Draw
 from bridgegen.jobs.suite.entries import RESULTS as FILE
 from bridgegen.jobs.suite.entries import find_entries, of_edition
 from bridgegen.jobs.suite.evaluate import Job, evaluate
@@ -36,8 +37,9 @@ from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 if TYPE_CHECKING:
     from bridgegen.jobs.frame import Table
     from bridgegen.jobs.preventability.result import PreventabilityMap
+    from bridgegen.jobs.suite.sealed import Sealed
 
-LOCK = "suite.lock"
+LOCK, SEALED = "suite.lock", "sealed.json"
 MOST_BYTES = 2**30
 """Largest size of a file of results [bytes]."""
 
@@ -53,6 +55,7 @@ class SuiteRun:
         settings: on which the results depend.
         jobs: of which they are the results, in the same order; empty where they were only read.
         maps: preventability maps of its scenarios, in its folder.
+        sealed: what an assessor's key drew and found, in its folder.
         page: that shows all this; None where none was written.
     """
 
@@ -62,6 +65,7 @@ class SuiteRun:
     settings: dict[str, Any]
     jobs: tuple[Job, ...] = ()
     maps: "tuple[PreventabilityMap, ...]" = ()
+    sealed: "Sealed | None" = None
     page: Path | None = None
 
     @cached_property
@@ -92,6 +96,12 @@ class SuiteRun:
     def work(self) -> str:
         """How many variations have a result."""
         return f"{sum(len(result.rows) for result in self.results):,} variations"
+
+    def drawn_lines(self, ego: str) -> list[str]:
+        """Return what an ego makes of what an assessor's key drew; nothing without one."""
+        from bridgegen.jobs.suite.sealed import sealed_lines
+
+        return sealed_lines(self.sealed, ego) if self.sealed else []
 
     def of_ego(self, ego: str) -> tuple[EntryResult, ...]:
         """Return the results with one ego."""
@@ -128,7 +138,7 @@ def run_suite(given: SuiteOptions) -> SuiteRun:
     from bridgegen.jobs.suite.maps import map_suite
     from bridgegen.jobs.suite.page import write_suite_page
 
-    suite = run_entries(SUITE, given)
+    suite = evaluate_suite(**vars(given))
     maps = map_suite(suite, given.callbacks) if given.with_maps else ()
     given.callbacks.stage("page")
     return replace(suite, maps=maps, page=write_suite_page(suite, suite.jobs, maps=maps))
@@ -146,15 +156,23 @@ def evaluate_suite(given: SuiteOptions) -> SuiteRun:
         StorageError: the folder holds something else, or cannot be written.
         Interrupted: Ctrl-C; what is done is kept.
     """
-    return run_entries(SUITE, given)
+    if given.assessor is None:
+        return run_entries(SUITE, given)
+    from bridgegen.jobs.suite.sealed import assess
+
+    return assess(given, given.assessor)
 
 
-def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
+def run_entries(
+    job: frame.Job, given: ScenariosOptions, draw: Draw | None = None, file: str = FILE
+) -> SuiteRun:
     """Run scenario files with all their variations; see `run_suite`.
 
     Args:
         job: for which; its command repeats this.
         given: its options.
+        draw: what an assessor's key draws in place of the variations.
+        file: of the results, in the folder.
 
     Returns:
         The results. An entry that cannot run is one of them, with its problem.
@@ -166,12 +184,13 @@ def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
     """
     files = [given.files] if isinstance(given.files, str | Path) else list(given.files)
     simulator = given.simulator if isinstance(given, SuiteOptions) else EMBEDDED
-    _check(given, simulator)
+    check(given, simulator)
     name = given.of_each.driver_name
     entries = of_edition(find_entries(files), given.matrix)
     drivers = tuple(dict.fromkeys(given.egos)) or ("",)
-    folder = Path(given.out) if given.out is not None else _folder(files)
+    folder = Path(given.out) if given.out is not None else default_folder(files)
     settings = _settings(given, simulator) | ({"driver_name": name} if name else {})
+    settings |= {"secret": draw.secret, "drawn": draw.number} if draw else {}
     jobs = [
         Job(
             entry,
@@ -181,11 +200,12 @@ def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
             given.samples,
             given.seed,
             given.matrix,
+            draw=draw,
         )
         for entry in entries
         for ego in drivers
     ]
-    path = folder / FILE
+    path = folder / file
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -220,7 +240,12 @@ def read_suite(folder: Path) -> SuiteRun:
     return SuiteRun(folder, egos, tuple(results), header.settings)
 
 
-def _check(given: ScenariosOptions, simulator: SimulatorChoice) -> None:
+def check(given: ScenariosOptions, simulator: SimulatorChoice) -> None:
+    """Refuse options that cannot be run.
+
+    Raises:
+        InputError: a number is out of range, or a driver or vehicle unknown.
+    """
     problems = range_problems(given)
     for name in given.egos:
         egos.get(name, (), given.time_limit)
@@ -239,7 +264,7 @@ def _check(given: ScenariosOptions, simulator: SimulatorChoice) -> None:
         raise InputError(*problems)
 
 
-def _folder(files: Sequence[str | Path]) -> Path:
+def default_folder(files: Sequence[str | Path]) -> Path:
     """Return the folder of results by default: none of those that hold the scenarios."""
     names = [Path(file).resolve().stem for file in files]
     folder = Path("suites") / ("-".join(names[:3]) + ("-and-more" if len(names) > 3 else ""))
@@ -267,6 +292,7 @@ def _settings(options: ScenariosOptions, simulator: SimulatorChoice) -> dict[str
         "empty_trigger": options.empty_trigger,
         "time_limit": options.time_limit,
         "version": version("bridgegen"),
+        **({} if options.odd is None else {"odd": options.odd}),
     }
 
 

@@ -45,6 +45,7 @@ class Modes {
     if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
     if (found.influences.length) notes.push(`What matters most: ${found.influences.slice(0, 3).map(({ name }) => name).join(", ")}.`);
     if (found.steps) notes.push(`${capital(found.steps)}.`);
+    if (found.extrapolated) notes.push(`Extrapolated: ${found.extrapolated}.`);
     if (found.more) notes.push(`${number(found.more)} more not shown.`);
     $("modes-note").textContent = notes.join(" ");
   }

@@ -21,6 +21,7 @@ function fillSummary() {
   const s = data.summary; // another object once a served page has taken in what is new
   $("title").textContent = s.title;
   $("facts").replaceChildren(...s.facts.map((fact) => element("li", {}, fact)));
+  for (const page of s.beside) $("facts").append(element("li", {}, element("a", { href: page }, page.split(".")[0])));
   if (!s.finished && !data.live) $("facts").append(element("li", { class: "warn" }, "not finished"));
   $("description").textContent = s.description;
   $("critical-means").textContent = `Critical means ${s.critical_rule}.`;

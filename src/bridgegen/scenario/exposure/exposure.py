@@ -26,6 +26,7 @@ from bridgegen.scenario.exposure.dependence import GaussianCopula
 from bridgegen.scenario.exposure.marginals import Conditional, Marginal
 from bridgegen.scenario.language.constraints import order
 from bridgegen.scenario.language.kinds import slack
+from bridgegen.scenario.language.parameterisation import NOT_KNOWN, Parameterisation
 from bridgegen.scenario.language.parameters import at
 from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.scenario.language.space import SearchSpace
@@ -186,6 +187,8 @@ class Exposure:
         encounters: how often the scenario is met; None where that is not known.
         source: where the numbers come from.
         place: the file, for messages.
+        parameterisation: what its parameters leave out of recorded events; None where it does not
+            say.
 
     Raises:
         InputError: formulas that depend on each other in a circle, or a correlation of a parameter
@@ -199,6 +202,7 @@ class Exposure:
     encounters: Encounters | None
     source: str
     place: str = field(default="", compare=False, repr=False)
+    parameterisation: Parameterisation | None = None
 
     def __post_init__(self) -> None:
         single = [name for name, marginal in self.marginals.items() if marginal.apart]
@@ -216,6 +220,12 @@ class Exposure:
         """What of it is a prior, as its source says since it was fitted; "" if nothing is."""
         _, found, told = self.source.partition(WEIGHED)
         return f"{found}{told}".strip()
+
+    @property
+    def left_out(self) -> str:
+        """What its parameters leave out of recorded events, in sentences."""
+        twins = self.parameterisation
+        return str(twins.figures()["says"]) if twins else NOT_KNOWN
 
     @property
     def names(self) -> tuple[str, ...]:

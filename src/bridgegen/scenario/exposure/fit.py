@@ -30,6 +30,7 @@ from bridgegen.scenario.exposure.marginals import Conditional, Form, Marginal
 from bridgegen.scenario.exposure.reader import build_exposure, chosen_exposure, exposure_text
 from bridgegen.scenario.exposure.tables import cell_reader, read_header, read_table
 from bridgegen.scenario.language.exposure_schema import MarginalSection
+from bridgegen.scenario.language.parameterisation import Parameterisation
 from bridgegen.scenario.language.parameters import Parameter, nearest
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 from bridgegen.scenario.language.scenario import LogicalScenario
@@ -151,6 +152,7 @@ def fit_exposure(
     others: Literal["uniform", "default"] | None = None,
     source: str | None = None,
     prior: str | Path | Exposure | None = None,
+    parameterisation: Parameterisation | None = None,
     replicates: int = 200,
     seed: int = 0,
     progress: Progress | None = None,
@@ -168,6 +170,7 @@ def fit_exposure(
         source: where the events come from, for the file.
         prior: an exposure that counts as `LEAST_ROWS` events besides these, see `_weighted`; as for
             `chosen_exposure`.
+        parameterisation: what the parameters leave out of recorded events, for the file.
         replicates: how many times events are resampled, and how many samples the p values take.
         seed: of all chance, at least 0.
         progress: called with the number of parameters done, and of all.
@@ -244,6 +247,7 @@ def fit_exposure(
             **({"others": others} if others else {}),
             "parameters": {name: parameter_fit.section for name, parameter_fit in fitted.items()},
             "dependence": {"correlation": _pairs(correlated, correlation)},
+            **({"parameterisation": parameterisation.model_dump()} if parameterisation else {}),
         },
     }
     # The fitted exposure is read from the text that is written, so that the file gives the same

@@ -18,6 +18,7 @@ from bridgegen.scenario.exposure.forms import Naming, build_marginal
 from bridgegen.scenario.exposure.marginals import Conditional, Marginal, Shared
 from bridgegen.scenario.language.distributions import Discrete
 from bridgegen.scenario.language.exposure_schema import ExposureFile, ExposureSection, FormSection
+from bridgegen.scenario.language.parameterisation import Parameterisation
 from bridgegen.scenario.language.parameters import nearest
 from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
 from bridgegen.scenario.language.reader import load, names, pack_names, read_document
@@ -121,10 +122,31 @@ def build_exposure(document: Document, scenario: SearchedScenario, folder: Path 
     if problems:
         raise ScenarioError(*problems)
     made = Exposure(
-        scenario, scenario.space(), marginals, copula, encounters, given.source, document.at(())
+        scenario,
+        scenario.space(),
+        marginals,
+        copula,
+        encounters,
+        given.source,
+        document.at(()),
+        given.parameterisation,
     )
     _ = made.feasible_share  # formulas have values everywhere, and constraints leave enough
     return made
+
+
+def read_parameterisation(path: Path) -> Parameterisation | None:
+    """Return what the file of a fit says of recorded twins; None where it says nothing.
+
+    Raises:
+        FileFormatError: the file cannot be read.
+        ScenarioError: it breaks a rule.
+    """
+    document = read_document(path)
+    given = section(ExposureFile, document.data)
+    if given is None:
+        raise ScenarioError(*shape_problems(ExposureFile, document))
+    return given.exposure.parameterisation
 
 
 def _document(source: str | Path) -> tuple[Document, Path | None]:

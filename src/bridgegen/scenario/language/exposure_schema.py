@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from bridgegen.scenario.language.parameterisation import Parameterisation
 from bridgegen.scenario.language.schema_types import (
     Formula,
     Number,
@@ -159,6 +160,8 @@ class ExposureSection(ShapedSection):
     """Dependence between the parameters; independent by default."""
     encounters: EncountersSection | None = None
     """Frequency with which the scenario is met."""
+    parameterisation: Parameterisation | None = None
+    """What the parameters leave out of recorded events, as verdicts that change."""
 
 
 class ExposureFile(ShapedSection):

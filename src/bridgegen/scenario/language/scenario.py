@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -106,6 +106,8 @@ class SearchedScenario:
         notes: what is searched otherwise than its files may lead one to expect.
         criteria: pass criteria, which a search measures besides.
         clauses: of a regulation or protocol, which a suite judges besides.
+        odd: the operational design domain that bounds it, a `bridgegen.scenario.odd.bounding.Fit`;
+            None: none does.
     """
 
     name: str
@@ -124,6 +126,7 @@ class SearchedScenario:
     notes: tuple[str, ...] = field(default=(), kw_only=True, compare=False, repr=False)
     criteria: "tuple[Criterion, ...]" = field(default=(), kw_only=True, repr=False)
     clauses: "tuple[Clause, ...]" = field(default=(), kw_only=True, repr=False)
+    odd: Any = field(default=None, kw_only=True, compare=False, repr=False)
 
     @property
     def fingerprint(self) -> str:

@@ -184,7 +184,9 @@ class AtStep(_Model):
         harmful: whether it is a failure.
         harm: 0 where there is no result.
         severity: probability of MAIS3+ in the ego's collision.
-        time: of the decisive conflict [s]; None where there is none.
+        time: of the decisive conflict [s]; None where there is none, like the next two.
+        place: of the ego's front in that conflict [m].
+        speed: of the ego then [m/s].
         conflict: its kind; "" where there is none.
     """
 
@@ -194,6 +196,8 @@ class AtStep(_Model):
     harm: Share
     severity: Share
     time: Number | None = None
+    place: tuple[Number, Number] | None = None
+    speed: Number | None = None
     conflict: Text = ""
 
 
@@ -494,6 +498,8 @@ class Triage(_Model):
             versions.
         step_checks: findings at fractions of the time step, then some evaluations without failure,
             evenly spread over the run; empty where none were made.
+        beyond: exported evaluations outside the region that a dossier calls validated.
+        extrapolated: likewise, as a warning; "" where none is, or no dossier was found.
     """
 
     schema_version: Literal[1] = 1
@@ -514,6 +520,8 @@ class Triage(_Model):
     influences: Annotated[tuple[Influence, ...], Field(max_length=1000)] = ()
     fresh: FreshRows | None = None
     step_checks: Annotated[tuple[StepCheck, ...], Field(max_length=MOST_NEIGHBOURHOODS)] = ()
+    beyond: Annotated[tuple[Count, ...], Field(max_length=10_000)] = ()
+    extrapolated: Text = ""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Triage":
@@ -544,6 +552,14 @@ class Triage(_Model):
     def step_check(self, evaluation: int) -> StepCheck | None:
         """Return the results of an evaluation at fractions of the time step, if it was checked."""
         return next((item for item in self.step_checks if item.evaluation == evaluation), None)
+
+    def doubts(self, evaluation: int) -> str:
+        """Return what makes the verdict on an evaluation doubtful; "" if nothing is known to."""
+        check, beyond = self.step_check(evaluation), evaluation in self.beyond
+        return ", ".join(
+            ["depends on the time step"] * (check is not None and not check.stable)
+            + ["outside the validated region"] * beyond
+        )
 
     @property
     def missed(self) -> int:

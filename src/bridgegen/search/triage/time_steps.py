@@ -10,6 +10,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Float, Int
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.trials import EVENT
 from bridgegen.search.triage.record import AtStep, StepCheck
 from bridgegen.simulation.choice import SimulatorChoice
 
@@ -32,7 +33,7 @@ def step_checks(
     for steps in (1, *finer):
         there = pipeline if steps == 1 else pipeline.elsewhere(SimulatorChoice(finer=steps))
         trials = there.try_all(X)
-        time = trials.event[:, 0].tolist()
+        event = dict(zip(EVENT, trials.event.T.tolist(), strict=True))
         for k, results in enumerate(at):
             conflict = str(trials.findings.conflict[k])
             results.append(
@@ -42,7 +43,9 @@ def step_checks(
                     harmful=bool(trials.harmful[k]),
                     harm=float(trials.harm[k]),
                     severity=float(trials.severity[k]),
-                    time=time[k] if conflict else None,
+                    time=event["time"][k] if conflict else None,
+                    place=(event["x"][k], event["y"][k]) if conflict else None,
+                    speed=event["v_ego"][k] if conflict else None,
                     conflict=conflict,
                 )
             )
