@@ -10,6 +10,7 @@ from bridgegen.pages.scenario_page import story_lines
 from bridgegen.pages.sketch import sketch
 from bridgegen.scenario.language.reader import load, names
 from bridgegen.scenario.language.roads import KNOBS
+from bridgegen.scenario.typology import said, typologies
 
 HERE = Path(__file__).parent
 PICTURES = HERE / "catalogue"
@@ -35,6 +36,35 @@ needs no mention. Besides, junctions have `legs` (`heading`, `lanes_in`, `lanes_
 """
 
 
+TYPES = """
+## Types of crashes
+
+Which types of crashes the scenarios realise, by published typologies, with the share of crashes
+that each type is. A scenario is one way in which a type happens, so a type that has one is not
+thereby tested; in some the ego is the one that errs, in others the other participant.
+`bridgegen list scenarios --typology` also names the types that no scenario realises. Figures that
+could not be read are not given, and none is estimated.
+"""
+
+
+def crash_types() -> str:
+    """Return the section on types of crashes."""
+    parts = [TYPES]
+    for typology in typologies().values():
+        rows = "\n".join(
+            f"| {kind.name} | {'' if kind.percent is None else f'{kind.percent:g} %'} | "
+            f"`{name}`: {why} |"
+            for kind in typology.covered
+            for name, why in kind.scenarios.items()
+        )
+        parts.append(
+            f"### {typology.title}\n\n{said(typology)[0].upper()}{said(typology)[1:]}. Shares of: "
+            f"{typology.counts}. Source: {typology.source}. How the figures are known: "
+            f"{typology.known}.\n\n| type | share | scenario |\n|---|---|---|\n{rows}\n"
+        )
+    return "\n".join(parts)
+
+
 def catalogue() -> str:
     """Return catalogue.md."""
     parts = [HEAD]
@@ -47,7 +77,7 @@ def catalogue() -> str:
             f"{' '.join(scenario.description.split())}\n\n{story}\n\n"
             f"Source: {' '.join(scenario.source.split())}\n"
         )
-    parts.append(TEMPLATES)
+    parts += [crash_types(), TEMPLATES]
     for template, knobs in KNOBS.items():
         rows = "\n".join(
             f"| `{name}` | {one.unit} | {one.usual:g} | {one.low:g} to {one.high:g} | {one.why} |"

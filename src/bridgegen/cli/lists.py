@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,12 +36,42 @@ def _of(name: str, *, entries: bool = False) -> Callable[[Callable[[], Listed]],
     return decorate
 
 
-@_of("scenarios")
-def _scenarios() -> Listed:
+@listing.command("scenarios")
+def list_scenarios(
+    typology: Annotated[
+        bool,
+        typer.Option("--typology", help="Which types of crashes they realise, and which not."),
+    ] = False,
+    as_json: options.Json = False,
+) -> None:
     """Logical scenarios of the catalogue."""
+    from bridgegen.cli.terminal.tables import print_entries, print_table
     from bridgegen.scenario.language.reader import load, names
+    from bridgegen.scenario.typology import typologies
 
-    return ("scenario", "title"), [(name, load(name).title) for name in names()]
+    if not typology:
+        rows = [(name, load(name).title) for name in names()]
+        print_table(("scenario", "title"), rows, as_json=as_json)
+    elif as_json:
+        print(json.dumps([asdict(each) for each in typologies().values()], indent=2))
+    else:
+        print_entries(*_typologies(names()), as_json=False)
+
+
+def _typologies(scenarios: Sequence[str]) -> Listed:
+    """Return how much of each typology the scenarios cover, and what they do not."""
+    from bridgegen.scenario.typology import named, said, typologies
+
+    rows = []
+    for each in typologies().values():
+        of_it = {name for kind in each.types for name in kind.scenarios}
+        # Of a typology of some crashes only, it says nothing that most scenarios are in none.
+        rest = sorted(set(scenarios) - of_it) if len(of_it) > len(scenarios) / 2 else []
+        left = "; ".join(map(named, each.uncovered))
+        facts = (each.counts, each.source, each.known)
+        rows.append((each.title, said(each), left, ", ".join(rest), *facts))
+    head = ("description", "not covered", "in none of these types", "shares of", "source")
+    return ("typology", *head, "figures"), rows
 
 
 @_of("packs")

@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # the command line starts without them
 Values = Mapping[str, Any]
 """Values of the parameters of the command ``search``, by name, as its parser returns them."""
 
-SCENARIO, SAVE = "scenario", "save"
+SCENARIO, SAVE, CATALOGUE = "scenario", "save", "catalogue"
 _HEADS = {"run", "runs"}
 MOST_SEARCHED = 10_000
 """Length of a damaged file's beginning in which its first key is sought [bytes]."""
@@ -96,7 +96,7 @@ def keys_of(command: Callable[..., Any], kind: type[Any] = SearchOptions) -> dic
     declared = {item.name: item for item in options_of(kind)}
     found = {}
     for name, parameter in inspect.signature(command).parameters.items():
-        if name == SAVE or get_origin(parameter.annotation) is not Annotated:
+        if name in (SAVE, CATALOGUE) or get_origin(parameter.annotation) is not Annotated:
             continue
         kind, info = get_args(parameter.annotation)
         types = {*get_args(kind)} - {NoneType} or {kind}
@@ -350,6 +350,8 @@ def with_run_files(
     several: Callable[[Path, list[FiledRun], Mapping[str, Key], Callable[[Values], Any]], None],
     kind: type[Any] = SearchOptions,
     argument: str = SCENARIO,
+    every: Callable[[dict[str, Any], Mapping[str, Key], Callable[[Values], Any]], None]
+    | None = None,
 ) -> Callable[[Callable[..., Any]], Callable[..., None]]:
     """Return what has a command take a run file in place of a scenario.
 
@@ -358,6 +360,8 @@ def with_run_files(
             command of one.
         kind: the class of the command's declared options.
         argument: the name of what the command takes without a spelling.
+        every: of a command with ``--catalogue``, runs all scenarios of the catalogue: of what was
+            given, the keys of a run, and the command of one.
     """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., None]:
@@ -372,6 +376,10 @@ def with_run_files(
                 # Only what the command line states overrides a file: its parser's defaults do not.
                 if str(getattr(context.get_parameter_source(name), "name", "")) == "COMMANDLINE"
             }
+            if every is not None and values.pop(CATALOGUE):
+                del given[CATALOGUE]
+                every(given, keys, lambda record: command(**{**values, **record}))
+                return
             save = values.pop(SAVE)
             given.pop(SAVE, None)
             named = values[argument] or ""  # a job may take none

@@ -1,11 +1,12 @@
 """The commands that make and show runs."""
 
 import json
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,6 +24,9 @@ from bridgegen.cli.connection import (
 )
 from bridgegen.cli.declared import with_declared_options
 from bridgegen.cli.run_files import (
+    DATABASE,
+    SAVE,
+    SCENARIO,
     FiledRun,
     Key,
     Values,
@@ -56,13 +60,70 @@ def search_all(
         keys: of a run.
         command: searches with some options.
     """
+    if status := _search_each(Path("runs") / path.stem, runs, keys, command, str(path)):
+        raise typer.Exit(status)
+
+
+def search_catalogue(
+    given: dict[str, Any], keys: Mapping[str, Key], command: Callable[[Values], object]
+) -> None:
+    """Search all scenarios of the catalogue, resume what was interrupted; then write a dashboard.
+
+    Args:
+        given: what the command line states.
+        keys: of a run.
+        command: searches with some options.
+
+    Raises:
+        InputError: an option does not go with it.
+    """
+    from bridgegen.drivers.drivers import get
+    from bridgegen.jobs.dashboard.dashboard import build_dashboard
+    from bridgegen.jobs.search.campaign import folder_word
+    from bridgegen.scenario.language.reader import names
+
+    if extra := [name for name in (SCENARIO, SAVE, "junit") if name in given]:
+        named = " and ".join(name if name == SCENARIO else f"--{name}" for name in extra)
+        raise InputError(f"--catalogue searches every scenario of the catalogue: no {named}")
+    driver = "own-drivers"
+    if ego := given.get("ego"):
+        get(ego)  # one error, and not one for each scenario
+        driver = folder_word(ego)
+    out = Path(given.pop("out", None) or Path("runs") / f"catalogue-{driver}")
+    runs = [FiledRun(name, {**given, SCENARIO: name, "out": out / name}) for name in names()]
+    status = _search_each(out, runs, keys, command, shlex.join(sys.argv[2:]))
+    if any((out / run.name / DATABASE).is_file() for run in runs):
+        found = build_dashboard(out)
+        print()
+        for line in (*found.weighed, f"{'page':<12}{found.page}"):
+            print(line)
+    if status:
+        raise typer.Exit(status)
+
+
+def _search_each(
+    folder: Path,
+    runs: list[FiledRun],
+    keys: Mapping[str, Key],
+    command: Callable[[Values], object],
+    again: str,
+) -> int:
+    """Make runs one after the other, resume those that were interrupted; return the exit status.
+
+    Args:
+        folder: of the runs that name none.
+        runs: each is recorded beside its folder, as ``FOLDER.yaml``.
+        keys: of a run.
+        command: searches with some options.
+        again: the words of the command that goes on with all runs.
+    """
     from bridgegen.cli.terminal.search import SearchProgress, conclusion, print_summary
     from bridgegen.jobs.search import Run, resume
 
     ends: dict[str, str] = {}
     status = 0
     for filed_run in runs:
-        out = Path(filed_run.values.get("out") or Path("runs") / path.stem / filed_run.name)
+        out = Path(filed_run.values.get("out") or folder / filed_run.name)
         values = {**filed_run.values, "out": out}
         print(f"\n{filed_run.name}", flush=True)
         try:
@@ -85,9 +146,9 @@ def search_all(
                     )
                 print_summary(run, live.seconds)
         except Interrupted as stop:
-            # The command that goes on with all runs of the file, and not only with this one.
+            # The command that goes on with all runs, and not only with this one.
             raise Interrupted(
-                stop.folder, stop.evaluations, stop.budget, command=f"bridgegen search {path}"
+                stop.folder, stop.evaluations, stop.budget, command=f"bridgegen search {again}"
             ) from None
         except typer.Exit as ended:
             status = max(status, ended.exit_code)
@@ -100,24 +161,32 @@ def search_all(
     print()
     for name, end in ends.items():
         print(f"{name:<{max(map(len, ends)) + 2}}{end}")
-    if status:
-        raise typer.Exit(status)
+    return status
 
 
 @app.command()
 @with_map_folder(WHAT)
-@with_run_files(search_all)
+@with_run_files(search_all, every=search_catalogue)
 @with_connection_options
 @with_declared_options
 def search(
+    options: SearchOptions,
     scenario: Annotated[
         str,
         typer.Argument(
-            help="A catalogue name, or the path of a YAML or an OpenSCENARIO file; or a run file.",
+            help="A catalogue name; or a YAML, OpenSCENARIO or run file.",
+            show_default=False,
             autocompletion=completing("scenario"),
         ),
-    ],
-    options: SearchOptions,
+    ] = "",
+    catalogue: Annotated[
+        bool,
+        typer.Option(
+            "--catalogue",
+            help="Search all scenarios that ship; one page weighs the failures.",
+            rich_help_panel=WHAT,
+        ),
+    ] = False,
     simulator: common.Simulator = None,
     simulator_set: common.SimulatorSettings = None,
     screen: common.Screen = None,
@@ -147,7 +216,11 @@ def search(
     from bridgegen.jobs import search as campaign
     from bridgegen.jobs.search.scenarios import margins_of
 
-    assert save is None  # written by the run file's reader, which knows what was given
+    # Both are taken by the run file's reader, which knows what was given.
+    assert save is None
+    assert not catalogue
+    if not scenario:
+        raise InputError("missing: SCENARIO, or --catalogue for all that ship")
     criteria = PassFailCriteria.read(
         fail_if or (),
         junit,

@@ -9,6 +9,7 @@ from typing import Any
 from bridgegen.base.disk import refuse_other
 from bridgegen.base.errors import FileFormatError
 from bridgegen.engine.options import called_with
+from bridgegen.jobs.dashboard.crash_types import CrashTypes, crash_types
 from bridgegen.jobs.dashboard.modes import (
     OpenMode,
     contradictions,
@@ -21,7 +22,9 @@ from bridgegen.jobs.dashboard.odd import Coverage, coverage
 from bridgegen.jobs.dashboard.options import DashboardOptions
 from bridgegen.jobs.dashboard.project import Project, read_project
 from bridgegen.jobs.dashboard.requirements import Matrix, matrices
+from bridgegen.jobs.dashboard.results import Result, current
 from bridgegen.jobs.dashboard.trends import Series, trends
+from bridgegen.jobs.dashboard.verdicts import is_rare, standings
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.results.failures import (
     FILE,
@@ -77,6 +80,11 @@ class Dashboard:
         return tuple(mode for mode in self.modes if mode.fails_now)
 
     @cached_property
+    def rare(self) -> tuple[Result, ...]:
+        """The current results that fail in fresh random draws alone."""
+        return tuple(filter(is_rare, current(self.project.results)))
+
+    @cached_property
     def regressions(self) -> tuple[OpenMode, ...]:
         """Those of them that are called fixed."""
         return tuple(mode for mode in self.failing if mode.is_regression)
@@ -129,6 +137,19 @@ class Dashboard:
         """The labels of all drivers, each version by itself."""
         return sorted({result.driver.label for result in self.project.results})
 
+    @cached_property
+    def crash_types(self) -> CrashTypes | None:
+        """How drivers stand in the types of crashes; None where few scenarios were tried."""
+        return crash_types(standings(self.project.results, self.failing))
+
+    @property
+    def weighed(self) -> list[str]:
+        """In which types of crashes drivers fail, in words; nothing where few were tried."""
+        types = self.crash_types
+        if types is None:
+            return []
+        return [*map(types.sentence, types.drivers[:MOST_LINES]), types.limits]
+
     @property
     def work(self) -> str:
         """How much was read."""
@@ -170,6 +191,7 @@ class Dashboard:
         lines: list[str | Table] = [failing_sentence(self)]
         if words := requirements_sentence(self):
             lines.append(words)
+        lines += self.weighed
         for mode in self.failing[:MOST_LINES]:
             status = "regression" if mode.is_regression else mode.status
             of = f"{mode.key.scenario}, {mode.key.driver}: {mode.title}"

@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from bridgegen.assess.criteria import margin_in_words
 from bridgegen.base.disk import write_whole
+from bridgegen.jobs.dashboard.crash_types import TypeStanding
 from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
 from bridgegen.jobs.dashboard.odd import Coverage, Covered
@@ -20,13 +21,14 @@ from bridgegen.jobs.dashboard.results_of import SuiteLine
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
 from bridgegen.jobs.dashboard.taxonomy import SOURCE
 from bridgegen.jobs.dashboard.trends import Series
-from bridgegen.jobs.dashboard.verdicts import Standing, Step, Verdict, history, standings
+from bridgegen.jobs.dashboard.verdicts import Standing, Step, Verdict, history, is_rare, standings
 from bridgegen.pages import charts, templates
 from bridgegen.pages.sentences import share
 from bridgegen.pages.templates import Banner, Cell, counted, joined, when
 from bridgegen.pages.thumbnails import Thumbnail, drawn, read_thumbnails
 from bridgegen.results.failures import FILE
 from bridgegen.scenario.odd.coverage import OddAttribute
+from bridgegen.scenario.typology import CrashType, most_harmful, named, shares
 
 MOST_MODES = 300
 """Largest number of failure modes of a table; the others are counted."""
@@ -88,6 +90,7 @@ def page_of(found: Dashboard, **served: Any) -> bytes:
         verdict=banner(found) if served else replace(banner(found), command=_next(found)),
         file=FILE,
         verdicts=verdicts_table(found, base),
+        types=_types(found, base),
         histories=_histories(found),
         notes=found.notes[:MOST_RESULTS],
         modes=modes_table("Failure modes of current results", found.failing, base),
@@ -145,8 +148,12 @@ def _next(found: Dashboard) -> str:
 
 def banner(found: Dashboard) -> Banner:
     """Return the verdict on the project."""
-    text = " ".join(filter(None, (failing_sentence(found), requirements_sentence(found))))
-    if found.failing or found.violated:
+    types = found.crash_types
+    # Of several drivers, the section has a sentence each.
+    weighed = types.sentence(types.drivers[0]) if types and len(types.drivers) == 1 else ""
+    sentences = (failing_sentence(found), weighed, requirements_sentence(found))
+    text = " ".join(filter(None, sentences))
+    if found.failing or found.violated or found.rare:
         return Banner(text, "fails", "FAILS")
     unsure = found.project.problems or any(
         result.unjudged or not result.finished for result in found.project.results
@@ -220,7 +227,10 @@ def verdicts_table(found: Dashboard, base: str) -> dict[str, Any]:
     Its links begin with ``base``.
     """
     stands = standings(found.project.results, found.failing)
-    failures = {key: len(standing.modes) for key, standing in stands.items()}
+    failures = {
+        key: len(standing.modes) or int(standing.verdict == "fails")
+        for key, standing in stands.items()
+    }
 
     def ordered(axis: int) -> list[str]:
         names = {key[axis] for key in stands}
@@ -229,7 +239,8 @@ def verdicts_table(found: Dashboard, base: str) -> dict[str, Any]:
 
     scenarios, drivers = ordered(0), ordered(1)
     rows, heads = scenarios[:MOST_TRIED], drivers[:MOST_DRIVERS]
-    shown = [(row, head) for row in rows for head in heads if failures.get((row, head))]
+    has_modes = {key for key, standing in stands.items() if standing.modes}
+    shown = [(row, head) for row in rows for head in heads if (row, head) in has_modes]
     shown.sort(key=lambda key: -stands[key].modes[0].severity)
     kept = {key: _picture_of(found, stands[key]) for key in shown[:MOST_PICTURES]}
     is_small = len(rows) > FEW
@@ -271,6 +282,12 @@ def _standing(standing: Standing, where: str, base: str, *, is_brief: bool) -> C
         # In short: who is responsible, and why, is in the table of failure modes.
         title = "" if is_brief else standing.modes[0].title.partition(" (")[0]
         note = " · ".join(filter(None, (title, f"MAIS3+ {share(severity)}" if severity else "")))
+    elif words == "fails":
+        space = next(result.space for result in standing.results if is_rare(result))
+        text, note = (
+            "FAILS rarely",
+            f"{space.harmful} of {space.rows} random draws" if space else "",
+        )
     worst = standing.worst
     href = _address(base, worst.page) if worst is not None else ""
     mark = _MARKS[words]
@@ -286,6 +303,47 @@ def _picture_of(found: Dashboard, standing: Standing) -> Thumbnail | None:
             if (picture.entry, picture.ego) == (result.entry, result.ego):
                 return picture
     return None
+
+
+def _types(found: Dashboard, base: str) -> dict[str, Any] | None:
+    """Return the matrix of types of crashes and drivers; None where few scenarios were tried."""
+    types = found.crash_types
+    if types is None:
+        return None
+    drivers = types.drivers[:MOST_DRIVERS]
+    rows = [
+        [
+            (kind.name, shares([kind]).removeprefix(", with ")),
+            *(_of_type(kind, each[driver], driver, base) for driver in drivers),
+        ]
+        for kind, each in types.lines
+    ]
+    heads = ("type of crash", *drivers)
+    return {
+        "table": _table("Verdicts by type of crash and driver", heads, rows, kind="verdicts"),
+        "said": [types.sentence(driver) for driver in drivers],
+        "limits": types.limits,
+        "typology": types.typology,
+        "untried": [*map(named, most_harmful(types.untried))],
+    }
+
+
+def _of_type(kind: CrashType, standing: TypeStanding, driver: str, base: str) -> Cell:
+    text, worst = str(standing.verdict), standing.worst
+    notes = [joined(standing.scenarios, 3)] if standing.scenarios else []
+    if standing.modes:
+        fails = {mode.key.scenario for mode in standing.modes}
+        passes = [name for name in standing.scenarios if name not in (*fails, *standing.otherwise)]
+        text = f"FAILS in {len(fails)} of {counted(len(standing.scenarios), 'scenario')}"
+        severity = standing.modes[0].severity
+        notes = [joined(sorted(fails), 3) + (f", not in {joined(passes, 2)}" if passes else "")]
+        notes += [f"worst MAIS3+ {share(severity)}"] if severity else []
+    elif standing.otherwise:
+        notes = [f"other or rare failures alone in {joined(standing.otherwise, 3)}"]
+    mark = _MARKS[standing.verdict]
+    label = f"{driver}, {kind.name}: {text}"
+    href = _address(base, worst.page) if worst is not None else ""
+    return Cell(text, notes, kind=mark[1], href=href, label=label, mark=mark)
 
 
 # --- Failure modes: what fails now, what failed before ---

@@ -11,8 +11,10 @@ def failing_sentence(found: Dashboard) -> str:
     if not found.project.results:
         return "No run and no suite is here yet."
     modes = found.failing
+    drawn = sorted({result.scenario for result in found.rare})
+    rare = f"In {joined(drawn, MOST_NAMED)}, random draws alone fail." if drawn else ""
     if not modes:
-        return "No failure mode is in any current result."
+        return rare or "No failure mode is in any current result."
     drivers = sorted({mode.key.driver for mode in modes})
     scenarios = {mode.key.scenario for mode in modes}
     verb = "fails" if len(drivers) == 1 else "fail"
@@ -27,7 +29,7 @@ def failing_sentence(found: Dashboard) -> str:
     for status in ("new", "known", "accepted"):
         number = int(found.figures[status])
         parts += [f"{number:,} {status}"] if number else []
-    return f"{words}: {joined(parts, 4)}."
+    return f"{words}: {joined(parts, 4)}. {rare}".rstrip()
 
 
 def requirements_sentence(found: Dashboard) -> str:

@@ -17,7 +17,7 @@ class Standing:
 
     Attributes:
         verdict: of the current results.
-        modes: that fail now, the gravest first.
+        modes: that fail now, the gravest first; none where only random draws fail.
         results: the current ones, the latest first.
     """
 
@@ -52,7 +52,7 @@ def standings(
     found = {}
     for key, some in held.items():
         verdict: Verdict = "no failure found"
-        if key in modes:
+        if key in modes or any(map(is_rare, some)):
             verdict = "fails"
         elif any(
             result.unjudged or not result.finished or not result.evaluations for result in some
@@ -60,6 +60,11 @@ def standings(
             verdict = "not judged"
         found[key] = Standing(verdict, tuple(modes.get(key, ())), tuple(some))
     return found
+
+
+def is_rare(result: Result) -> bool:
+    """Return whether a run fails in its fresh random draws alone: it has no failure mode then."""
+    return not result.failures and result.space is not None and result.space.harmful > 0
 
 
 @dataclass(frozen=True)

@@ -456,11 +456,15 @@ def _junction(given: SearchArguments, roads: RoadMap | None) -> str | None:
 
 def _new_folder(scenario: str, driver: str) -> Path:
     """Return a folder of that scenario and driver in ``runs`` that does not exist yet."""
-    short = driver.rpartition(":")[2] if ":" in driver else Path(driver).stem
-    word = re.sub(r"[^\w-]+", "-", short)[:40]
-    name = f"{scenario}-{word}"
+    name = f"{scenario}-{folder_word(driver)}"
     numbers = itertools.chain([""], (f"-{n}" for n in itertools.count(2)))
     return next(path for n in numbers if not os.path.lexists(path := Path("runs") / f"{name}{n}"))
+
+
+def folder_word(driver: str) -> str:
+    """Return what a driver is called in the name of a folder."""
+    short = driver.rpartition(":")[2] if ":" in driver else Path(driver).stem
+    return re.sub(r"[^\w-]+", "-", short)[:40]
 
 
 def _absolute(path: Path | str | None) -> str | None:
