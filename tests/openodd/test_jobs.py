@@ -112,7 +112,7 @@ def test_a_suites_variations_are_run_again_in_its_odd(tmp_path, cli):
     code, said, err = cli(*suite, "verify", f"{out}/sealed.json", "cut-in", "--ego=route-follower")
     assert (code, "to the bit" in said) == (0, True), err
     _, said, err = cli(*suite, "replay", out, "cut-in", "1")
-    assert said.count("to the bit") == 2, said + err
+    assert "gives it, too" in said, said + err
 
 
 def test_a_map_of_what_is_preventable_stays_inside(tmp_path):
