@@ -12,6 +12,7 @@ from bridgegen.assess.conflict.findings import KINDS, Findings
 from bridgegen.assess.conflict.harm import NEAR_MISS, Count, decisive
 from bridgegen.assess.conflict.place import place_on_route
 from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.engine.runner import Runner
 from bridgegen.simulation.embedded.places.network import Network
@@ -90,8 +91,8 @@ class Trials:
         instant = conflicts.instant[rows, other]
         front = rollout.box[0, 2] + 0.5 * rollout.box[0, 0]
         h = rollout.h[rows, 0, instant]
-        x = rollout.x[rows, 0, instant] + front * np.cos(h)
-        y = rollout.y[rows, 0, instant] + front * np.sin(h)
+        x = rollout.x[rows, 0, instant] + front * elementary.cos(h)
+        y = rollout.y[rows, 0, instant] + front * elementary.sin(h)
         wanted = ok & np.isin(findings.conflict, list(KINDS.values()))
         for p in np.unique(which[wanted]).tolist():
             at = np.flatnonzero(wanted & (which == p))

@@ -65,7 +65,9 @@ def harm_of_pairs(conflicts: Conflicts, count: Count = "ego") -> Float:
     )
     # Severities span five powers of ten: on a linear scale 83 % of 3,259 collisions lay within
     # 0.02, and a touch at 0.23 m/s outranked a pedestrian missed at 13 m/s.
-    severe = np.log1p(share * conflicts.potential / LIGHT) / np.log1p(1.0 / LIGHT)
+    # Not log1p, whose bits are the system's: harm ranks what is searched.
+    top = elementary.log(1.0 + 1.0 / LIGHT)
+    severe = elementary.log(1.0 + share * conflicts.potential / LIGHT) / top
     worth = NEAR_MISS + (1.0 - NEAR_MISS) * severe
     value = _of_kinds(conflicts, count, contact=worth, near=worth)
     noted = COURSE + (NEAR_MISS - COURSE) * conflicts.breach

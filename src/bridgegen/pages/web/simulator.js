@@ -245,7 +245,7 @@ export class Simulator {
     for (let e = 0; e < count; e++) {
       const kind = kinds[read(e, "kind")], [ttc, needed, nearness] = ["ttc", "needed", "nearness"].map((name) => real[e * wide + columns[name]]);
       const urgent = (1 - Math.min(ttc, harm.horizon) / harm.horizon) * (1 - this.call("exp", -needed / harm.serious));
-      const worth = (share) => harm.near + (1 - harm.near) * (Math.log1p((share * potential[e]) / harm.light) / Math.log1p(1 / harm.light));
+      const worth = (share) => harm.near + (1 - harm.near) * (this.call("log", 1 + (share * potential[e]) / harm.light) / this.call("log", 1 + 1 / harm.light));
       const partly = (share) => harm.course + (harm.near - harm.course) * share;
       const touches = kind === "contact", happens = touches || kind === "near miss", violates = kind === "violation";
       let value = happens ? worth(touches ? 1 : harm.nearly * urgent) : kind && ttc < Infinity ? partly(urgent) : harm.course * nearness;

@@ -235,7 +235,7 @@ class LogNormal:
             raise InputError(f"a log-normal distribution is above 0, got the limit {limits[0]:g}")
         # OpenSCENARIO gives the moments of the value itself: m = exp(μ + σ²/2) and v = m²·(exp(σ²)
         # − 1), solved for σ² and μ.
-        square = math.log1p(variance / mean**2)
+        square = elementary.log(1.0 + variance / mean**2)
         logs = (elementary.log(limits[0]), elementary.log(limits[1])) if limits else None
         return cls(Normal(elementary.log(mean) - 0.5 * square, math.sqrt(square), logs))
 
