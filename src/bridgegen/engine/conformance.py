@@ -8,6 +8,7 @@ from importlib.resources import files
 import numpy as np
 
 from bridgegen.assess.conflict.analysis import analyse
+from bridgegen.assess.conflict.harm import harm_of_pairs
 from bridgegen.base import elementary
 from bridgegen.base._elementary_kernels import FUNCTIONS
 from bridgegen.base.errors import InputError
@@ -46,7 +47,7 @@ def rows_digest(scenario: str, driver: str, rows: int = ROWS, *, verdicts: bool 
         scenario: of the catalogue, or a path.
         driver: the ego's.
         rows: how many are drawn; those that the scenario's rules refuse do not count.
-        verdicts: include all that is said of conflicts, but harm.
+        verdicts: include all that is said of conflicts.
 
     Raises:
         InputError: no such scenario or driver, or the driver does not drive there.
@@ -66,7 +67,7 @@ def rows_digest(scenario: str, driver: str, rows: int = ROWS, *, verdicts: bool 
                 found = analyse(rollout)
                 yield from (found.kind, found.type, found.responsible, found.rule)
                 yield from (found.instant, found.decided, found.preventable, found.at_fault)
-                yield found.severity  # not harm: it takes a logarithm of the system's
+                yield from (found.severity, harm_of_pairs(found))
 
     return _digest(arrays())
 
