@@ -117,6 +117,26 @@ class RoadsSection(ShapedSection):
     after_length: Length | None = None
 
 
+class BandSection(ShapedSection):
+    """One band of a ``prior``."""
+
+    name: Text
+    """Name of the band in words, as "heavy rain"."""
+    to: Number
+    """Highest value of the band, in the parameter's unit; it starts where the one before ends."""
+    share: Number
+    """Share of driving time in which the parameter is in the band; 1 together."""
+
+
+class PriorSection(ShapedSection):
+    """The ``prior`` of a parameter: how often its values are met."""
+
+    bands: Annotated[list[BandSection], Field(min_length=1)]
+    """Bands of values, ascending; the first may be the lowest value alone."""
+    source: Text
+    """Source of the shares."""
+
+
 class ParameterSection(ShapedSection):
     """One entry of ``parameters``."""
 
@@ -138,6 +158,8 @@ class ParameterSection(ShapedSection):
     """Quantity that the parameter states, in words."""
     source: Text
     """Source of the range."""
+    prior: PriorSection | None = None
+    """Shares of driving time, by which a search draws its values; without one evenly."""
 
     @field_validator("low", "high", "default", mode="before")
     @classmethod
@@ -262,6 +284,8 @@ class ScenarioFile(ShapedSection):
     """Behaviour of participants other than the ego where their road ends: leave, or stand."""
     axes: Annotated[list[AxisName], Field(min_length=1)]
     """Axes that are searched by default (see --axes)."""
+    priors: Literal["met", "even"] = "met"
+    """Values that a search draws: as often as priors say, or evenly over the ranges."""
     include: list[Text] = []
     """Fragments to include: of the catalogue, or files beside this one; "NAME as PREFIX_" again."""
     participants: dict[str, ParticipantSection]
