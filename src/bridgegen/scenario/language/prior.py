@@ -88,7 +88,7 @@ class Prior:
 
     def _below(self, value: Value, *, inclusive: bool) -> Float:
         """Return the share of smaller values, or of those that are not larger."""
-        shares = np.interp(value, *self._ends)
+        shares = np.asarray(np.interp(value, *self._ends))
         return shares if inclusive else np.where(np.asarray(value) > self.low, shares, 0.0)
 
     def _pieces(self, lo: Value, hi: Value) -> tuple[Float, Float]:
@@ -137,10 +137,14 @@ class Prior:
         return next((band for band in self.bands if value <= band.to), self.bands[-1])
 
     def words(self, low: float, high: float) -> str:
-        """Return in words what values from low to high are, and how often: "night, 18 % …"."""
+        """Return the bands from low to high in words, with their share: "night, 18 % of driving".
+
+        Of a single value it is the share of its band.
+        """
         first, last = (self.bands.index(self.band(value)) for value in (low, high))
+        share = self.met(low, high) if low < high else self.bands[first].share
         named = " or ".join(band.name for band in self.bands[first : last + 1])
-        return f"{named}, {percent(self.met(low, high))} of driving"
+        return f"{named}, {percent(share)} of driving"
 
 
 def _along(x: Float, at: Float, value: Float) -> Float:

@@ -356,9 +356,10 @@ def _prior(
     """Return the prior that a parameter declares."""
     if given.prior is None:
         return None
-    if kind != FLOAT:
+    if kind != FLOAT or Axis(given.axis) is not Axis.WEATHER:  # pages say "weather as it is met"
         raise ScenarioError(
-            f"parameters.{name} of kind {kind.name} cannot have a prior{at(place)}"
+            "only a float of the axis weather can have a prior, got "
+            f"parameters.{name} of kind {kind.name}, axis {given.axis}{at(place)}"
         )
     bands = tuple(Band(band.name, band.to, band.share) for band in given.prior.bands)
     try:
