@@ -143,8 +143,8 @@ class Prior:
         """
         first, last = (self.bands.index(self.band(value)) for value in (low, high))
         share = self.met(low, high) if low < high else self.bands[first].share
-        named = " or ".join(band.name for band in self.bands[first : last + 1])
-        return f"{named}, {percent(share)} of driving"
+        ends = dict.fromkeys((self.bands[first].name, self.bands[last].name))
+        return f"{' to '.join(ends)}, {percent(share)} of driving"
 
 
 def _along(x: Float, at: Float, value: Float) -> Float:
