@@ -65,6 +65,7 @@ def searches(folder: Path) -> None:
     folder.mkdir(parents=True)
     for kind in ("met", "even"):
         modes, in_daylight, dry, seconds, runs = 0, 0, 0.0, 0.0, 0
+        kinds: set[tuple[str, str, str]] = set()
         for name in SCENARIOS:
             text = shipped_text(name).decode().replace("\naxes:", f"\npriors: {kind}\naxes:", 1)
             scenario = folder / f"{name}-{kind}.yaml"
@@ -79,9 +80,10 @@ def searches(folder: Path) -> None:
                     fair &= rows.fog_density < 43
                     dry += float((rows.precipitation == 0).mean())
                     modes += len(run.modes)
+                    kinds |= {(name, ego, mode.title) for mode in run.modes}
                     in_daylight += sum(bool(fair[mode.shown]) for mode in run.modes)
         print(
-            f"{kind}: {modes} failure modes, {in_daylight} in dry daylight; "
+            f"{kind}: {modes} failure modes of {len(kinds)} kinds, {in_daylight} in dry daylight; "
             f"{dry / runs:.0%} of rows dry; {seconds / runs:.1f} s a run"
         )
 

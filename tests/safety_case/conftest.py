@@ -36,7 +36,7 @@ SEARCHES = {
 def made(tmp_path_factory) -> dict[str, Path]:
     """The runs; read only."""
     base = tmp_path_factory.mktemp("runs")
-    # Of weather as it is met, 200 rows leave bins of rain and fog empty: the claim of coverage fails.
+    # Of weather as it is met, 200 rows leave bins of rain and fog empty: coverage fails.
     text = shipped_text("cut-in").decode().replace("\naxes:", "\npriors: even\naxes:", 1)
     (base / "cut-in.yaml").write_text(text, "utf-8")
     for name, (scenario, given) in SEARCHES.items():
