@@ -10,28 +10,21 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import ScenarioError
 from bridgegen.base.units import percent
+from bridgegen.scenario.language.kinds import Value
 
-Value = Float | float
-
-RARE = 0.25
-"""Share of driving time below which a band is worth a word."""
+_RARE = 0.25  # share of driving time below which a band is worth a word
 
 
 @dataclass(frozen=True)
 class Band:
-    """Values from the end of the band before it, or the parameter's lowest one.
-
-    Attributes:
-        name: in words: "heavy rain".
-        to: its highest value; the lowest one of the parameter if the first band is that value.
-        share: of driving time.
-    """
+    """Values above the band before it up to ``to``, their name in words and share of driving."""
 
     name: str
     to: float
@@ -40,16 +33,10 @@ class Band:
 
 @dataclass(frozen=True)
 class Prior:
-    """How often the values of a parameter are met, in driving time.
-
-    Attributes:
-        low: lowest value of the parameter.
-        high: highest value.
-        bands: ascending.
-        source: where the shares come from.
+    """How often values from low to high are met: ascending bands, of which the first may be low.
 
     Raises:
-        ScenarioError: a rule is broken; all that are.
+        ScenarioError: a rule is broken; the first that is.
     """
 
     low: float
@@ -58,33 +45,20 @@ class Prior:
     source: str
 
     def __post_init__(self) -> None:
-        ends = [self.low, *(band.to for band in self.bands)]
-        problems = [
-            f"the bands of a prior must ascend, got '{band.name}' to {band.to:g} after {before:g}"
-            for number, (before, band) in enumerate(zip(ends[:-1], self.bands, strict=True))
-            if not (before < band.to or (number == 0 and before == band.to))
-        ]
-        if ends[-1] != self.high:
-            problems.append(f"the last band of a prior must end at {self.high:g}, got {ends[-1]:g}")
-        total = math.fsum(band.share for band in self.bands)
-        if not all(band.share > 0.0 for band in self.bands) or not math.isclose(
-            total, 1.0, abs_tol=1e-6
-        ):
-            problems.append(
-                f"the shares of a prior must be above 0 and 1 together, got {total:g} of "
-                f"{', '.join(f'{band.share:g}' for band in self.bands)}"
-            )
-        if problems:
-            raise ScenarioError(*problems)
+        to, shares = [band.to for band in self.bands], [band.share for band in self.bands]
+        rises = all(a < b for a, b in pairwise(to)) and to[0] >= self.low
+        if not (rises and to[-1] == self.high):
+            raise ScenarioError(f"bands must ascend from {self.low:g} to {self.high:g}, got {to}")
+        if not (min(shares) > 0.0 and math.isclose(math.fsum(shares), 1.0, abs_tol=1e-6)):
+            raise ScenarioError(f"shares must be above 0, and 1 together, got {shares}")
 
     @cached_property
     def _ends(self) -> tuple[Float, Float]:
         """The ends of the bands, and the share up to each, of which the first may be above 0."""
         values = np.array([self.low, *(band.to for band in self.bands)])
-        shares = np.concatenate([[0.0], np.cumsum([band.share for band in self.bands])])
-        shares /= shares[-1]
+        shares = np.cumsum([0.0, *(band.share for band in self.bands)])
         single = int(values[0] == values[1])
-        return values[single:], shares[single:]
+        return values[single:], shares[single:] / shares[-1]
 
     def _below(self, value: Value, *, inclusive: bool) -> Float:
         """Return the share of smaller values, or of those that are not larger."""
@@ -93,18 +67,16 @@ class Prior:
 
     def _pieces(self, lo: Value, hi: Value) -> tuple[Float, Float]:
         """Return corners of the line from what is left, 0 to 1, to shares: ``(4,)`` or (4, N)."""
+        lo, hi = np.broadcast_arrays(lo, hi)
         zero = min(max(0.0, self.low), self.high)
-        before = self._below(zero, inclusive=False)
-        after = self._below(zero, inclusive=True)
-        first, last = self._below(lo, inclusive=False), self._below(hi, inclusive=True)
-        below = (np.asarray(lo) < zero) | (np.asarray(lo) == zero) & (zero == self.low)
-        both = below & ((np.asarray(hi) > zero) | (zero == self.high))
-        first, last, both = np.broadcast_arrays(first, last, both)
-        middle = np.where(both, before, first), np.where(both, after, last)
-        corners = np.stack([first, *middle, last])
-        zeros, ones = np.zeros(first.shape), np.ones(first.shape)
-        left = np.stack([zeros, np.where(both, before, 0.0), np.where(both, after, 1.0), ones])
-        return left, corners
+        sides = self._below(zero, inclusive=False), self._below(zero, inclusive=True)
+        ends = self._below(lo, inclusive=False), self._below(hi, inclusive=True)
+        both = (lo < zero) | ((lo == zero) & (zero == self.low))
+        both &= (hi > zero) | (zero == self.high)
+        corners = [np.where(both, *pair) for pair in zip(sides, ends, strict=True)]
+        left = [np.where(both, side, end) for side, end in zip(sides, (0.0, 1.0), strict=True)]
+        zeros, ones = np.zeros(lo.shape), np.ones(lo.shape)
+        return np.stack([zeros, *left, ones]), np.stack([ends[0], *corners, ends[1]])
 
     def at(self, share: Float, lo: Value, hi: Value) -> Float:
         """Return values at shares of what an interval leaves, as `Parameter.at`."""
@@ -114,33 +86,25 @@ class Prior:
 
     def share(self, value: Value, lo: Value, hi: Value) -> Float:
         """Return the shares at which values are, as `Parameter.share`; the middle of several."""
-        first, last = (self._left(value, lo, hi, inclusive=way) for way in (False, True))
-        return 0.5 * (first + last)
+        middle = 0.5 * np.add(*self.shares(value, value, lo, hi))
+        return np.where(np.less(lo, hi), middle, 0.5)
 
-    def shares(self, low: float, high: float, lo: Value, hi: Value) -> tuple[Float, Float]:
+    def shares(self, low: Value, high: Value, lo: Value, hi: Value) -> tuple[Float, Float]:
         """Return the first and the last share of values in a range, as `Parameter.shares`."""
-        first = self._left(low, lo, hi, inclusive=False)
-        return first, self._left(high, lo, hi, inclusive=True)
-
-    def _left(self, value: Value, lo: Value, hi: Value, *, inclusive: bool) -> Float:
         left, corners = self._pieces(lo, hi)
-        found = _along(self._below(value, inclusive=inclusive), corners, left)
-        return np.where(corners[0] < corners[-1], found, 0.5)
+        first = _along(self._below(low, inclusive=False), corners, left)
+        return first, _along(self._below(high, inclusive=True), corners, left)
 
     def met(self, low: float, high: float) -> float:
         """Return the share of driving time with values from low to high."""
-        share = self._below(high, inclusive=True) - self._below(low, inclusive=False)
-        return max(0.0, float(share))
+        return float(self._below(high, inclusive=True) - self._below(low, inclusive=False))
 
     def band(self, value: float) -> Band:
         """Return the band that a value lies in."""
         return next((band for band in self.bands if value <= band.to), self.bands[-1])
 
     def words(self, low: float, high: float) -> str:
-        """Return the bands from low to high in words, with their share: "night, 18 % of driving".
-
-        Of a single value it is the share of its band.
-        """
+        """Return bands from low to high, and their share; of one value, its band's."""
         first, last = (self.bands.index(self.band(value)) for value in (low, high))
         share = self.met(low, high) if low < high else self.bands[first].share
         ends = dict.fromkeys((self.bands[first].name, self.bands[last].name))
@@ -165,7 +129,7 @@ def surprise(bands: Iterable[Band]) -> float:
 
 def rarities(bands: Iterable[Band]) -> str:
     """Return which bands are rare: "night (18 % of driving), fog (1.2 %)"; or ""."""
-    rare = [band for band in bands if band.share < RARE]
+    rare = [band for band in bands if band.share < _RARE]
     return ", ".join(
         f"{band.name} ({percent(band.share)}{'' if k else ' of driving'})"
         for k, band in enumerate(rare)

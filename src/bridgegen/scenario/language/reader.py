@@ -361,12 +361,11 @@ def _prior(
             "only a float of the axis weather can have a prior, got "
             f"parameters.{name} of kind {kind.name}, axis {given.axis}{at(place)}"
         )
-    bands = tuple(Band(band.name, band.to, band.share) for band in given.prior.bands)
+    bands = tuple(Band(name, to, share) for name, (to, share) in given.prior.bands.items())
     try:
         return Prior(low, high, bands, given.prior.source)
     except ScenarioError as error:
-        found = [f"parameters.{name}.prior: {text}{at(place)}" for text in error.problems]
-        raise ScenarioError(*found) from None
+        raise ScenarioError(f"parameters.{name}.prior: {error}{at(place)}") from None
 
 
 def _key_problems(name: str, given: ParameterSection) -> list[str]:

@@ -117,22 +117,13 @@ class RoadsSection(ShapedSection):
     after_length: Length | None = None
 
 
-class BandSection(ShapedSection):
-    """One band of a ``prior``."""
-
-    name: Text
-    """Name of the band in words, as "heavy rain"."""
-    to: Number
-    """Highest value of the band, in the parameter's unit; it starts where the one before ends."""
-    share: Number
-    """Share of driving time in which the parameter is in the band; 1 together."""
-
-
 class PriorSection(ShapedSection):
     """The ``prior`` of a parameter: how often its values are met."""
 
-    bands: Annotated[list[BandSection], Field(min_length=1)]
-    """Bands of values, ascending; the first may be the lowest value alone."""
+    bands: Annotated[
+        dict[str, Annotated[list[Number], Field(min_length=2, max_length=2)]], Field(min_length=1)
+    ]
+    """Bands of values, ascending: NAME: [highest value, share]; the first may be one value."""
     source: Text
     """Source of the shares."""
 
