@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import bridgegen as bg
+from bridgegen.scenario.language.reader import shipped_text
 
 SEARCHES = {
     "fails": (
@@ -19,7 +20,7 @@ SEARCHES = {
         "crossroads-s4",
         {"ego": "route-follower", "objective": {"harm": None}, "budget": 10},
     ),
-    "clean": ("cut-in", {"ego": "reference", "algorithm": "random"}),
+    "clean": ("cut-in.yaml", {"ego": "reference", "algorithm": "random"}),
     "judged": (
         "pedestrian-at-night",
         {
@@ -35,8 +36,12 @@ SEARCHES = {
 def made(tmp_path_factory) -> dict[str, Path]:
     """The runs; read only."""
     base = tmp_path_factory.mktemp("runs")
+    # Of weather as it is met, 200 rows leave bins of rain and fog empty: coverage fails.
+    text = shipped_text("cut-in").decode().replace("\naxes:", "\npriors: even\naxes:", 1)
+    (base / "cut-in.yaml").write_text(text, "utf-8")
     for name, (scenario, given) in SEARCHES.items():
         given = {"budget": 200, "keep": 2, "causes": False, **given}
+        scenario = base / scenario if scenario.endswith(".yaml") else scenario
         bg.run_search(scenario, **given, out=base / name)
     return {name: base / name for name in SEARCHES}
 

@@ -15,6 +15,7 @@ from bridgegen.cli.verdict.of_run import figures_of
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.pages.findings_payload import triage_payload
 from bridgegen.results.store import Store
+from bridgegen.scenario.language.reader import shipped_text
 from bridgegen.search.triage import JSON_FILE
 from bridgegen.search.triage.minimal import Ladder
 from bridgegen.search.triage.modes import keys_of
@@ -201,12 +202,21 @@ def test_a_driver_without_failures_leaves_an_empty_export_and_a_bound(tmp_path, 
     assert figures_of(run)["modes"] == 0
 
 
+def even(name, folder):
+    """Return the file of a scenario whose weather is even: more of its rows are in bad weather."""
+    path = folder / f"{name}.yaml"
+    text = shipped_text(name).decode()
+    path.write_text(text.replace("\naxes:", "\npriors: even\naxes:", 1), "utf-8")
+    return path
+
+
 def test_a_failure_among_fresh_draws_alone_is_one_and_is_exported(tmp_path, capsys):
     from bridgegen.cli.terminal.search import print_summary
 
     run = bg.run_search(
-        "bus-pulls-out", ego="reference", budget=300, seed=4, out=tmp_path / "run", causes=False
-    )
+        even("bus-pulls-out", tmp_path), ego="reference", budget=300, seed=4, causes=False,
+        out=tmp_path / "run",
+    )  # fmt: skip
     assert run.triage.bound.harmful == 0
     assert run.verdict == "fails"
     assert run.scenarios == run.modes == ()
@@ -229,8 +239,8 @@ def test_a_failure_among_fresh_draws_alone_is_one_and_is_exported(tmp_path, caps
 
 def test_a_run_says_how_many_excused_collisions_a_careful_driver_avoids(tmp_path):
     run = bg.run_search(
-        "cut-out", ego="reference", budget=200, seed=0, algorithm="random", keep=2, causes=False,
-        out=tmp_path / "run",
+        even("cut-out", tmp_path), ego="reference", budget=200, seed=0, algorithm="random", keep=2,
+        causes=False, out=tmp_path / "run",
     )  # fmt: skip
     said = re.search(r"careful driver avoids (\d+) of (\d+) coll", run.triage.bound.sentence)
     avoided, again = map(int, said.groups())

@@ -253,9 +253,7 @@ def _found_lines(found: "Triage") -> list[str]:
             if space.harmful
             else f"at most {percent(space.high)} of random scenarios fail"
         )
-        lines.append(
-            f"How common: {share}; uniform over the ranges, 95 % confidence; not a rate on roads"
-        )
+        lines.append(f"How common: {share}; {space.measure}, 95 % confidence; not a rate on roads")
     simplest = [mode.minimal for mode in found.modes if mode.minimal is not None]
     if simplest:
         lines.append(f"Simplest: {simplest[0].sentence}")

@@ -138,7 +138,8 @@ class RunArgument(Part):
         goal.add(
             "Assumption",
             f"{at}.1",
-            "Draws are independent and as the scenario declares: uniform over each parameter's "
+            "Draws are independent and as the scenario declares: "
+            f"{'by its prior or uniform' if space.met else 'uniform'} over each parameter's "
             "range, as far as the constraints leave it, one parameter after the other. Draws "
             "without a result, or with implausible traffic, count neither way."
             + (" Sobol points are taken for independent draws." if space.drawn == "sobol" else ""),

@@ -20,6 +20,7 @@ from bridgegen.engine.replays import Replays
 from bridgegen.jobs.search.exported import FOLDER, NOT_EXPORTED, Exported, Refused
 from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.results.store import Rows
+from bridgegen.scenario.language.prior import rarities
 from bridgegen.search.algorithms.dominance import by_merit
 from bridgegen.search.triage.judgement import judgement
 from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Triage
@@ -262,6 +263,7 @@ def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> dict[str, objec
         "critical": bool(rows.critical[i]),
         "implausible": rows.findings.implausible[i] or None,
         "parameters": _parameters(pipeline, rows.X[i]),
+        "rarely_met": rarities(pipeline.space.bands(pipeline.space.values(rows.X[i]))),
         "metrics": _named(
             dict(zip(pipeline.metrics, rows.metrics[i].tolist(), strict=True)),
             pipeline.units,

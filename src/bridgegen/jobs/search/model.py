@@ -153,7 +153,7 @@ class Model:
         return f"Model({self.scenario}, {self.driver}, {len(self.parameters)} parameters)"
 
     def sample(self, count: int, seed: int = 0) -> "pd.DataFrame":
-        """Return random rows, uniform over what ranges and constraints allow.
+        """Return random rows of what ranges and constraints allow: even ones, but for priors.
 
         Args:
             count: number of rows.

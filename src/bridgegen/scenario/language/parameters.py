@@ -13,6 +13,7 @@ from bridgegen.base.errors import ScenarioError, UnknownNameError
 from bridgegen.base.units import has_unit, in_unit
 from bridgegen.scenario.language.expression import RESERVED, Expression
 from bridgegen.scenario.language.kinds import FLOAT, Kind
+from bridgegen.scenario.language.prior import Prior
 
 UNITS = {
     "m": "length",
@@ -72,6 +73,7 @@ class Parameter:
         description: what it is, for people.
         source: where its range comes from.
         place: file and line that declare it, for messages.
+        prior: how often its values are met; None: a search draws it evenly.
 
     Raises:
         ScenarioError: a rule is broken; all that are.
@@ -87,6 +89,7 @@ class Parameter:
     description: str = ""
     source: str = ""
     place: str = field(default="", compare=False, repr=False)
+    prior: Prior | None = field(default=None, repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
         label = f"{self.name} [{self.unit}]"
@@ -112,11 +115,11 @@ class Parameter:
             lo: smallest value, one or ``(N,)``.
             hi: largest value, likewise.
         """
-        return self.kind.at(share, lo, hi)
+        return (self.prior or self.kind).at(share, lo, hi)
 
     def share(self, value: Float, lo: Float | float, hi: Float | float) -> Float:
         """Return the shares at which values are, ``(N,)``; 0.5 where any would do."""
-        return self.kind.share(value, lo, hi)
+        return (self.prior or self.kind).share(value, lo, hi)
 
     def shares(
         self, low: float, high: float, lo: Float | float, hi: Float | float
@@ -133,7 +136,7 @@ class Parameter:
             The first and the last share, one or ``(N,)`` each, in [0, 1]; the last is at most the
             first where no value, or but one of infinitely many, lies in the range.
         """
-        return self.kind.shares(low, high, lo, hi)
+        return (self.prior or self.kind).shares(low, high, lo, hi)
 
     def ends(self, low: float, high: float) -> tuple[float, float] | None:
         """Return its lowest and its highest value in a range; None where it may take any there.

@@ -14,7 +14,7 @@ from bridgegen.scenario.language.checks import NEEDED, time_problems, try_out, u
 from bridgegen.scenario.language.constraints import problems_of
 from bridgegen.scenario.language.criteria import read_criteria_in, unknown_entities
 from bridgegen.scenario.language.expression import Expression, parse
-from bridgegen.scenario.language.kinds import KEYS, KINDS
+from bridgegen.scenario.language.kinds import FLOAT, KEYS, KINDS, Kind
 from bridgegen.scenario.language.objectives import HARM, PAPERS, read_objective
 from bridgegen.scenario.language.parameters import (
     Axis,
@@ -27,6 +27,7 @@ from bridgegen.scenario.language.parameters import (
 )
 from bridgegen.scenario.language.places import Quantities, TemporaryChanges, jam_members
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
+from bridgegen.scenario.language.prior import Band, Prior
 from bridgegen.scenario.language.protocols import read_clauses_in, read_matrix
 from bridgegen.scenario.language.roads import KNOBS, RoadsSpec
 from bridgegen.scenario.language.roads_reader import read_roads
@@ -309,6 +310,7 @@ class _Declarations:
                 given.description,
                 given.source,
                 place,
+                prior=_prior(name, given, kind, low, high, place),
             )
         )
 
@@ -346,6 +348,24 @@ def _numbered(
     if formula is None or not formula.names & categories.keys():
         return formula
     return parse(formula.source, rule.place, categories)
+
+
+def _prior(
+    name: str, given: ParameterSection, kind: Kind, low: float, high: float, place: str
+) -> Prior | None:
+    """Return the prior that a parameter declares."""
+    if given.prior is None:
+        return None
+    if kind != FLOAT or Axis(given.axis) is not Axis.WEATHER:  # pages say "weather as it is met"
+        raise ScenarioError(
+            "only a float of the axis weather can have a prior, got "
+            f"parameters.{name} of kind {kind.name}, axis {given.axis}{at(place)}"
+        )
+    bands = tuple(Band(name, to, share) for name, (to, share) in given.prior.bands.items())
+    try:
+        return Prior(low, high, bands, given.prior.source)
+    except ScenarioError as error:
+        raise ScenarioError(f"parameters.{name}.prior: {error}{at(place)}") from None
 
 
 def _key_problems(name: str, given: ParameterSection) -> list[str]:
@@ -408,6 +428,8 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     if not declarations.complete or not isinstance(document.data, dict):
         raise ScenarioError(*problems, *declarations.problems)  # others would be consequences
     declarations.number_categories()
+    if document.data.get("priors") == "even":
+        declarations.parameters = [replace(item, prior=None) for item in declarations.parameters]
     parameters = {parameter.name: parameter for parameter in declarations.parameters}
     derived = {item.name: item for item in declarations.derived}
     declared: dict[str, Parameter | Derived] = {**derived, **parameters}

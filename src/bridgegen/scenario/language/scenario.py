@@ -282,7 +282,9 @@ class LogicalScenario(SearchedScenario):
             for participant in self.participants
             if participant.model
         }
+        priors = {name: item.prior for name, item in self.parameters.items() if item.prior}
         parts = (
+            priors,
             drivers,
             headings,
             lifted,

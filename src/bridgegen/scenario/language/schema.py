@@ -117,6 +117,17 @@ class RoadsSection(ShapedSection):
     after_length: Length | None = None
 
 
+class PriorSection(ShapedSection):
+    """The ``prior`` of a parameter: how often its values are met."""
+
+    bands: Annotated[
+        dict[str, Annotated[list[Number], Field(min_length=2, max_length=2)]], Field(min_length=1)
+    ]
+    """Bands of values, ascending: NAME: [highest value, share]; the first may be one value."""
+    source: Text
+    """Source of the shares."""
+
+
 class ParameterSection(ShapedSection):
     """One entry of ``parameters``."""
 
@@ -138,6 +149,8 @@ class ParameterSection(ShapedSection):
     """Quantity that the parameter states, in words."""
     source: Text
     """Source of the range."""
+    prior: PriorSection | None = None
+    """Shares of driving time, by which a search draws its values; without one evenly."""
 
     @field_validator("low", "high", "default", mode="before")
     @classmethod
@@ -262,6 +275,8 @@ class ScenarioFile(ShapedSection):
     """Behaviour of participants other than the ego where their road ends: leave, or stand."""
     axes: Annotated[list[AxisName], Field(min_length=1)]
     """Axes that are searched by default (see --axes)."""
+    priors: Literal["met", "even"] = "met"
+    """Values that a search draws: as often as priors say, or evenly over the ranges."""
     include: list[Text] = []
     """Fragments to include: of the catalogue, or files beside this one; "NAME as PREFIX_" again."""
     participants: dict[str, ParticipantSection]

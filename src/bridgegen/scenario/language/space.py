@@ -18,6 +18,7 @@ from bridgegen.scenario.language.constraints import (
 )
 from bridgegen.scenario.language.kinds import slack
 from bridgegen.scenario.language.parameters import Bound, Derived, Parameter, at, nearest, read_axes
+from bridgegen.scenario.language.prior import Band
 
 # Points at which a new space is tried: all corners of the cube up to _CORNERS, and as many others.
 _CORNERS = 2048
@@ -27,7 +28,8 @@ class SearchSpace:
     """What is searched of a scenario, and how a point of the unit cube becomes a row.
 
     Decoding takes the parameters in an order in which each comes after all that limit it, and
-    spreads each over the interval that the earlier ones leave to it (``Parameter.at``). So every
+    spreads each over the interval that the earlier ones leave to it (``Parameter.at``), evenly or
+    by its prior. So every
     point of the cube is feasible, and no algorithm needs a penalty. A parameter that is not
     searched stands at its default, or where ``fixed`` puts it, moved into its interval where a
     bound asks for it. Derived quantities follow.
@@ -277,6 +279,11 @@ class SearchSpace:
         """
         rows = as_float("X", X, (None, len(self.names)), finite=False)
         return violations(self.constraints, self._table(rows))
+
+    def bands(self, values: Mapping[str, float]) -> list[Band]:
+        """Return in which bands of their priors values of searched parameters lie."""
+        priors = ((name, self.parameters[name].prior) for name in self.variables)
+        return [prior.band(values[name]) for name, prior in priors if prior is not None]
 
     def _table(self, rows: Float) -> dict[str, Float]:
         return dict(zip(self.names, np.ascontiguousarray(rows.T), strict=True))

@@ -42,13 +42,14 @@ _MARGIN = {
 }
 
 
-def estimate(drawn: Drawn, harmful: int, rows: int) -> Estimate:
+def estimate(drawn: Drawn, harmful: int, rows: int, *, met: bool = False) -> Estimate:
     """Estimate a share of the space from independent rows, with its exact interval.
 
     Args:
         drawn: the source of the rows; "" if there are none.
         harmful: number of harmful rows.
         rows: number of rows with a result.
+        met: whether parameters were drawn as often as their priors say.
 
     Source: C. Clopper and E. Pearson, Biometrika 26 (1934); 95 %, two-sided.
     """
@@ -57,7 +58,9 @@ def estimate(drawn: Drawn, harmful: int, rows: int) -> Estimate:
         return Estimate(drawn="", rows=0, harmful=0, share=None, low=0.0, high=1.0)
     low, high = clopper_pearson(harmful, rows)
     share = harmful / rows if rows else None
-    return Estimate(drawn=drawn, rows=rows, harmful=harmful, share=share, low=low, high=high)
+    return Estimate(
+        drawn=drawn, rows=rows, harmful=harmful, share=share, low=low, high=high, met=met
+    )
 
 
 def least_margins(
@@ -271,7 +274,7 @@ def _of_the_space(space: Estimate, such: str) -> str:
     """Return the share of the space that is such, with its interval."""
     if not space.drawn or not space.rows:
         return f"how much of the space is {such} is unknown: the search chose its rows on purpose"
-    by = _DRAWN[space.drawn].format(space.rows)
+    by = _DRAWN[space.drawn].format(space.rows) + (f", {space.measure}" if space.met else "")
     if not space.harmful:
         return f"with 95 % confidence at most {_at_most(space.high)} of the space is {such} ({by})"
     return (

@@ -378,12 +378,17 @@ def _words(space: SearchSpace, name: str, span: _Span) -> str:
     parameter = space.parameters[name]
     unit = "" if parameter.unit in _UNITLESS or parameter.kind.names else f" {parameter.unit}"
     text = parameter.kind.text(span.low, _number), parameter.kind.text(span.high, _number)
-    if text[0] == text[1]:
-        return f"= {text[0]}{unit}"
+    low, high = span.low, span.high
     both = (span.below and span.above) or span.closed
-    if both or parameter.kind.turn is not None:  # neither end of a turn is lower
-        return f"from {text[0]} to {text[1]}{unit}"
-    return f"≥ {text[0]}{unit}" if span.below else f"≤ {text[1]}{unit}"
+    if text[0] == text[1]:
+        said = f"= {text[0]}{unit}"
+    elif both or parameter.kind.turn is not None:  # neither end of a turn is lower
+        said = f"from {text[0]} to {text[1]}{unit}"
+    elif span.below:
+        said, high = f"≥ {text[0]}{unit}", parameter.high
+    else:
+        said, low = f"≤ {text[1]}{unit}", parameter.low
+    return f"{said} ({parameter.prior.words(low, high)})" if parameter.prior else said
 
 
 def _number(value: float) -> str:

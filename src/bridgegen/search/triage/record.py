@@ -66,6 +66,7 @@ class Estimate(_Model):
         share: harmful / rows; None where there are no rows.
         low: lower end of the two-sided 95 % Clopper-Pearson interval.
         high: its upper end, also where no row is harmful: a one-sided 97.5 % upper bound.
+        met: whether parameters were drawn as often as their priors say; else all evenly.
     """
 
     drawn: Drawn
@@ -74,6 +75,12 @@ class Estimate(_Model):
     share: Share | None
     low: Share
     high: Share
+    met: bool = False
+
+    @property
+    def measure(self) -> str:
+        """By which measure of the space, in words."""
+        return "weather as it is met, all else uniform" if self.met else "uniform over the ranges"
 
 
 class FreshRows(_Model):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from bridgegen.base.arrays import Bool, Float, Int, Numbers
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.trials import EVENT
 from bridgegen.results.store import Recorded, Rows
+from bridgegen.scenario.language.prior import surprise
 from bridgegen.search.triage.bound import (
     CONTACT,
     UNBIASED,
@@ -57,6 +59,9 @@ from bridgegen.search.triage.record import (
 )
 from bridgegen.search.triage.time_steps import step_checks
 from bridgegen.search.triage.what_happened import COPY, apart, distinct, of_events, of_results
+
+SAME = 0.05
+"""Harm that makes no difference between findings, of which one is in weather that is met more."""
 
 _SAMPLE = 18  # stream of random numbers, apart from others of the same seed
 
@@ -234,7 +239,7 @@ class _Triage:
         several = distinct(events, every, self._effort.spare * max(self._keep, 1))
         self._simulate(dict.fromkeys(i for some in (*worst, several) for i in some), fixes=False)
         while True:  # a next best one is checked only where the best depends on the time step
-            best = [min(some, key=lambda i: (*self._doubts(i), some.index(i))) for some in worst]
+            best = [self._best(some, harm) for some in worst]
             if not self._check_steps(best):
                 return best
 
@@ -316,7 +321,16 @@ class _Triage:
 
     def _rank(self, i: int, harm: Float) -> tuple[Any, ...]:
         """Return the sort key of findings: stable and robust ones first, then the worst."""
-        return *self._doubts(i), -float(harm[i]), *self._U[i].tolist()
+        return *self._doubts(i), *self._met(i, harm), -float(harm[i]), *self._U[i].tolist()
+
+    def _best(self, some: Sequence[int], harm: Float) -> int:
+        """Return the row that stands for its mode, of some, the worst first."""
+        return min(some, key=lambda i: (*self._doubts(i), *self._met(i, harm), some.index(i)))
+
+    def _met(self, i: int, harm: Float) -> tuple[int, float]:
+        """Return a sort key: of about the same harm, weather that is met most comes first."""
+        bands = self._space.bands(self._space.values(self._rows.X[self._at[i]]))
+        return (-round(float(harm[i]) / SAME), surprise(bands)) if bands else (0, 0.0)
 
     def _by_tested_cause(
         self, groups: Sequence[Group], shown: Sequence[int], U: Float, harm: Float
@@ -358,13 +372,15 @@ class _Triage:
     def _shares(self, groups: Sequence[Group]) -> tuple[Estimate, list[Estimate], FreshRows | None]:
         """Return the harmful share of the space, that of each mode, and the fresh rows drawn."""
         rows = self._rows
+        priors = [self._space.parameters[name].prior for name in self._space.variables]
+        drawn_of = partial(estimate, met=any(priors))
         fit = int(((rows.status == 0) & ~_implausible(rows)).sum())
         # Only rows that were drawn without regard to results estimate a share. Of a particle
         # swarm's leaves that are 80 to 100 % critical, 2 to 98 % of random scenarios are.
         if self._algorithm in UNBIASED:
             drawn: Drawn = "sobol" if self._algorithm == "sobol" else "random"
-            each = [estimate(drawn, len(item.rows), fit) for item in groups]
-            return estimate(drawn, len(self._at), fit), each, None
+            each = [drawn_of(drawn, len(item.rows), fit) for item in groups]
+            return drawn_of(drawn, len(self._at), fit), each, None
         n = self._effort.fresh
         is_possible = self._tests and self._pipeline.cause is None
         if not (n and is_possible and self._space.n_var):
@@ -383,8 +399,8 @@ class _Triage:
         ok = int(results.ok.sum())
         harm = zip(results.harm.tolist(), results.ok.tolist(), strict=True)
         fresh = FreshRows(harm=tuple(item if has else None for item, has in harm), mode=tuple(mode))
-        each = [estimate("fresh", mode.count(k), ok) for k in range(1, len(groups) + 1)]
-        return estimate("fresh", int(results.harmful.sum()), ok), each, fresh
+        each = [drawn_of("fresh", mode.count(k), ok) for k in range(1, len(groups) + 1)]
+        return drawn_of("fresh", int(results.harmful.sum()), ok), each, fresh
 
     def _record(
         self,
