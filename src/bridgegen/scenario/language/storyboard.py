@@ -336,7 +336,7 @@ class Storyboard:
                 f"a route starts where an inbound lane does: {which}, got {got}", (*path, "start")
             )
         if end.way != "out":
-            got = f"P{_point(end)}" if by_points else str(end)
+            got = f"P{_point(end)}" if by_points and end.leg in LETTERS else str(end)
             which = ", ".join(f"P{2 * LETTERS.index(leg) + 2}" for leg in self._roads.legs)
             self._report(
                 f"a route ends where an outbound lane does: {which}, got {got}", (*path, "end")
