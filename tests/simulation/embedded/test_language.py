@@ -581,7 +581,7 @@ def test_a_reason_lets_pedestrians_leave_the_crosswalk_and_nothing_else(made, tm
     )
     with refuses(ScenarioError):
         made(walker)
-    lifted = 'type: pedestrian\n    off_crosswalk: "<b>$late</b> & \'tired\'"'
+    lifted = "type: pedestrian\n    off_crosswalk: \"<b>$late</b> & 'tired'\""
     pipeline = made(walker.replace("type: pedestrian", lifted))
     assert motion(pipeline)["walker"]["v"][0] == 1.0
     there_and_back(pipeline)

@@ -330,13 +330,13 @@ class Storyboard:
                 self._report(f"a route changes no lane: {name} goes from {start} to {end}", path)
             return
         if start.way != "in":
-            got = f"P{_point(start)}" if by_points else str(start)
+            got = _point(start) if by_points else str(start)
             which = ", ".join(f"P{2 * LETTERS.index(leg) + 1}" for leg in self._roads.legs)
             self._report(
                 f"a route starts where an inbound lane does: {which}, got {got}", (*path, "start")
             )
         if end.way != "out":
-            got = f"P{_point(end)}" if by_points and end.leg in LETTERS else str(end)
+            got = _point(end) if by_points else str(end)
             which = ", ".join(f"P{2 * LETTERS.index(leg) + 2}" for leg in self._roads.legs)
             self._report(
                 f"a route ends where an outbound lane does: {which}, got {got}", (*path, "end")
@@ -344,7 +344,7 @@ class Storyboard:
         back = start.leg == end.leg and start.way == "in" and end.way == "out"
         if back and self._roads.template != "roundabout":
             self._report(
-                f"a route must not turn back: P{_point(start)} to P{_point(end)} is one leg", path
+                f"a route must not turn back: {_point(start)} to {_point(end)} is one leg", path
             )
 
     # -- what and when -------------------------------------------------------------------------
@@ -614,9 +614,11 @@ def _body(given: ParticipantSection) -> Body | None:
     )
 
 
-def _point(place: Waypoint) -> int:
-    """Return the number of a place's point in the paper's counting."""
-    return 2 * LETTERS.index(place.leg) + (1 if place.way == "in" else 2)
+def _point(place: Waypoint) -> str:
+    """Return a place's point in the paper's counting; its lane where the leg is no junction's."""
+    if place.leg not in LETTERS:
+        return str(place)
+    return f"P{2 * LETTERS.index(place.leg) + (1 if place.way == 'in' else 2)}"
 
 
 # --- Which recorded events a scenario is, and what its parameters are in them ---
