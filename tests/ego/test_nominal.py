@@ -13,6 +13,7 @@ IDEAL = {"perceiving": (), "all ideal": ("perception", "prediction", "control")}
 ROUND = {
     "cut-out": (IDEAL, 1),
     "jam-tail-in-fog": (("all ideal",), 1),
+    "object-on-road": (IDEAL, 1),
     "wrong-way-driver": (("perceiving",), -1),
 }
 """By scenario: the drivers that pass somebody by another lane, and on which side (1 left)."""

@@ -18,6 +18,7 @@ def drivers(scenario):
 
 CARELESS = {
     "wrong-way-driver": ["ghost"], "bus-pulls-out": ["bus"], "cyclist-swings-out": ["cyclist"],
+    "cyclist-crosses": ["cyclist"], "oncoming-overtaker": ["overtaker"],
 }  # fmt: skip
 """Who does not look, for that is what the scenario is about."""
 

@@ -49,22 +49,25 @@ def edited(individuals, *edits):
     Args:
         individuals: as they were.
         edits: (subject, property, value) sets a value, "+property" adds one, "-property" takes
-            that one away; a text names an individual (or, of "a", a class).
+            that one away (None: all); a text names an individual (or, of "a", a class).
     """
     base, quads = base_of(individuals), list(individuals.quads)
     for subject, name, value in edits:
         node, said = ox.NamedNode(base + subject), name.lstrip("+-")
         predicate = TYPE if said == "a" else bg(said)
-        if isinstance(value, str):
+        if value is None:
+            assert name.startswith("-")
+        elif isinstance(value, str):
             value = bg(value) if said == "a" else ox.NamedNode(base + value)
         else:
             value = ox.Literal(value)
-        if name.startswith("-"):
+        if name.startswith("-") and value is not None:
             quads.remove(ox.Quad(node, predicate, value))
             continue
         if not name.startswith("+"):
             quads = [q for q in quads if (q.subject, q.predicate) != (node, predicate)]
-        quads.append(ox.Quad(node, predicate, value))
+        if value is not None:
+            quads.append(ox.Quad(node, predicate, value))
     return Individuals(quads)
 
 
@@ -138,6 +141,12 @@ BREACHES = [
     ("1 to 4: a pedestrian without a crosswalk", "pedestrian-at-night",
      [("crosswalk_D", "on_road", "leg_A")],
      "walker (Pedestrian)", "crosses-on-crosswalk", "leg_D_in_sidewalk at 3 m: Pedestrians"),
+    ("1 to 4: a pedestrian off crosswalks without a reason", "pedestrian-off-crosswalk",
+     [("walker", "-has_reason_off_crosswalk", None)],
+     "walker (Pedestrian)", "walks-on-sidewalk", "must be a sidewalk, or a lane where"),
+    ("1 to 4: a pedestrian crosses without a reason", "child-between-parked",
+     [("child", "-has_reason_off_crosswalk", None)],
+     "child (Pedestrian)", "crosses-on-crosswalk", "must cross within a crosswalk"),
     ("1 to 4: a vehicle on the sidewalk", "red-light-runner",
      [("runner_start", "on_lane", "leg_D_in_sidewalk")],
      "runner (Car)", "on-drivable-lane", "got leg_D_in_sidewalk: Vehicles keep to the lanes"),

@@ -59,6 +59,8 @@ def _participant(participant: Participant, scenario: LogicalScenario) -> str:
     extra = ", with blue light and siren on" if participant.siren else ""
     if participant.exceeds_limit:
         extra += f", faster than allowed if need be ({participant.exceeds_limit})"
+    if participant.off_crosswalk:
+        extra += f", away from crosswalks ({participant.off_crosswalk})"
     if participant.path:
         start, *between, end = map(_place, participant.path)
         past, how = (

@@ -12,6 +12,8 @@ from bridgegen.base.errors import ScenarioError
 from bridgegen.base.physics import GRAVITY, GRIP
 from bridgegen.drivers import kinds as lamps
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.jobs.search.validate import validate_file
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.write import to_xml
@@ -569,3 +571,28 @@ def test_what_cannot_happen_is_refused(made, message):
 """
     with pytest.raises(ScenarioError, match=message):
         made(events=event)
+
+
+def test_a_reason_lets_pedestrians_leave_the_crosswalk_and_nothing_else(made, tmp_path):
+    """Crossing, walking along the lane, and standing on it; the reason is in all files."""
+    walker = PARTICIPANTS + (
+        "  walker:\n    type: pedestrian\n    speed: 1.0\n"
+        "    path: [{distance: 300.0, offset: -3.0}, {distance: 320.0, offset: 4.0}]\n"
+    )
+    with refuses(ScenarioError):
+        made(walker)
+    lifted = "type: pedestrian\n    off_crosswalk: \"<b>$late</b> & 'tired'\""
+    pipeline = made(walker.replace("type: pedestrian", lifted))
+    assert motion(pipeline)["walker"]["v"][0] == 1.0
+    there_and_back(pipeline)
+    files = write_scenario(pipeline, pipeline.space.row({}), tmp_path, "one")
+    assert [problem for file in files for problem in validate_file(file)] == []
+    assert all("late" in file.read_text("utf-8") for file in files if file.suffix != ".xodr")
+    standing = (
+        PARTICIPANTS + "  walker:\n    type: pedestrian\n    start: {distance: 300.0, lane: 1}\n"
+    )
+    with refuses(ScenarioError):
+        made(standing)
+    made(standing.replace("type: pedestrian", lifted))
+    with refuses(ScenarioError):
+        made(PARTICIPANTS + "    off_crosswalk: a car\n")

@@ -172,7 +172,11 @@ class Places:
             at = roads.crosswalk(waypoint.leg)
             rule = "pedestrians cross on crosswalks only"
             if at is None or waypoint.leg != other.leg:
-                self._report(f"{rule}: there is none where {name} crosses leg {waypoint.leg}", path)
+                self._report(
+                    f"{rule}: there is none where {name} crosses leg {waypoint.leg}; else "
+                    "off_crosswalk states why",
+                    path,
+                )
                 return
             for point in (waypoint, other):
                 low, high = self._range(point.distance)

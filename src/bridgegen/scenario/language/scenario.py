@@ -261,6 +261,11 @@ class LogicalScenario(SearchedScenario):
             for participant in self.participants
             if participant.exceeds_limit
         }
+        astray = {
+            participant.name: participant.off_crosswalk
+            for participant in self.participants
+            if participant.off_crosswalk
+        }
         sirens = [participant.name for participant in self.participants if participant.siren]
         bodies = {
             participant.name: participant.own_body
@@ -288,6 +293,7 @@ class LogicalScenario(SearchedScenario):
             drivers,
             headings,
             lifted,
+            astray,
             sirens,
             bodies,
             types,

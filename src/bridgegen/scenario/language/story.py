@@ -82,6 +82,7 @@ class Participant:
         own_body: its body, where it is not the type's or model's.
         siren: whether it is an emergency vehicle on a call, to which all give way.
         exceeds_limit: why it may drive faster than road and weather allow; empty: it may not.
+        off_crosswalk: why a pedestrian is on the road away from crosswalks; empty: it is not.
     """
 
     name: str
@@ -93,6 +94,7 @@ class Participant:
     driver: str = field(default="", repr=False, kw_only=True)
     heading: Quantity = field(default=0.0, repr=False, kw_only=True)
     exceeds_limit: str = field(default="", repr=False, kw_only=True)
+    off_crosswalk: str = field(default="", repr=False, kw_only=True)
     siren: bool = field(default=False, repr=False, kw_only=True)
     own_body: Body | None = field(default=None, repr=False, kw_only=True)
     type_by: str = field(default="", repr=False, kw_only=True)

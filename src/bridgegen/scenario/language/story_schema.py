@@ -107,6 +107,8 @@ class ParticipantSection(ShapedSection):
     """Heading relative to the lane's direction [deg], left positive; 180 faces the traffic."""
     exceeds_limit: Annotated[str, Field(strict=True, min_length=1, max_length=200)] | None = None
     """Reason why it may be faster than road and weather allow, such as an emergency call."""
+    off_crosswalk: Annotated[str, Field(strict=True, min_length=1, max_length=200)] | None = None
+    """Reason why a pedestrian is on the road away from crosswalks, where it has no priority."""
     siren: Annotated[bool, Field(strict=True)] = False
     """Whether an emergency vehicle has its blue light and siren on, so that all give way to it."""
     driver: Word | None = None

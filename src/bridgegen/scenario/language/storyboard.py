@@ -124,6 +124,11 @@ class Storyboard:
                     f"a speed limit is for vehicles, {name} has none to exceed",
                     (*path, "exceeds_limit"),
                 )
+            if given.off_crosswalk and given.type != "pedestrian":
+                self._report(
+                    f"off_crosswalk is for pedestrians, {name} is of type {given.type}",
+                    (*path, "off_crosswalk"),
+                )
             self._check_driver(name, given, path)
             if given.places:
                 yield self._at_places(name, given, path)
@@ -165,7 +170,7 @@ class Storyboard:
             self._report(
                 f"an {given.driver} driver keeps to lanes, {name} has a path: it is scripted", path
             )
-        if given.type == "pedestrian":
+        if given.type == "pedestrian" and not given.off_crosswalk:
             self._places.check_crossing(name, points, path)
         driver = given.driver or ""
         return Participant(
@@ -177,6 +182,7 @@ class Storyboard:
             points,
             driver=driver,
             exceeds_limit=given.exceeds_limit or "",
+            off_crosswalk=given.off_crosswalk or "",
             siren=given.siren,
             own_body=_body(given),
             type_by=given.type_by or "",
@@ -211,9 +217,11 @@ class Storyboard:
         stands = conduct in ("obstacle", "pedestrian", "animal")
         if stands and (given.speed != 0.0 or end is not None):
             self._report(f"{name} without a path stands: no speed, no end", path)
-        if given.type == "pedestrian" and start.lane != "sidewalk":
+        if given.type == "pedestrian" and start.lane != "sidewalk" and not given.off_crosswalk:
             self._report(
-                f"{name} must stand on a sidewalk: pedestrians are on roads to cross", path
+                f"{name} must stand on a sidewalk: pedestrians are on roads to cross; else "
+                "off_crosswalk states why",
+                path,
             )
         if conduct == "vehicle" and start.lane == "sidewalk":
             self._report(f"{name} must stand on a lane: vehicles are on roads only", path)
@@ -226,6 +234,7 @@ class Storyboard:
             driver=given.driver or "",
             heading=given.heading,
             exceeds_limit=given.exceeds_limit or "",
+            off_crosswalk=given.off_crosswalk or "",
             siren=given.siren,
             own_body=_body(given),
             type_by=given.type_by or "",
@@ -321,13 +330,13 @@ class Storyboard:
                 self._report(f"a route changes no lane: {name} goes from {start} to {end}", path)
             return
         if start.way != "in":
-            got = f"P{_point(start)}" if by_points else str(start)
+            got = _point(start) if by_points else str(start)
             which = ", ".join(f"P{2 * LETTERS.index(leg) + 1}" for leg in self._roads.legs)
             self._report(
                 f"a route starts where an inbound lane does: {which}, got {got}", (*path, "start")
             )
         if end.way != "out":
-            got = f"P{_point(end)}" if by_points else str(end)
+            got = _point(end) if by_points else str(end)
             which = ", ".join(f"P{2 * LETTERS.index(leg) + 2}" for leg in self._roads.legs)
             self._report(
                 f"a route ends where an outbound lane does: {which}, got {got}", (*path, "end")
@@ -335,7 +344,7 @@ class Storyboard:
         back = start.leg == end.leg and start.way == "in" and end.way == "out"
         if back and self._roads.template != "roundabout":
             self._report(
-                f"a route must not turn back: P{_point(start)} to P{_point(end)} is one leg", path
+                f"a route must not turn back: {_point(start)} to {_point(end)} is one leg", path
             )
 
     # -- what and when -------------------------------------------------------------------------
@@ -605,9 +614,11 @@ def _body(given: ParticipantSection) -> Body | None:
     )
 
 
-def _point(place: Waypoint) -> int:
-    """Return the number of a place's point in the paper's counting."""
-    return 2 * LETTERS.index(place.leg) + (1 if place.way == "in" else 2)
+def _point(place: Waypoint) -> str:
+    """Return a place's point in the paper's counting; its lane where the leg is no junction's."""
+    if place.leg not in LETTERS:
+        return str(place)
+    return f"P{2 * LETTERS.index(place.leg) + (1 if place.way == 'in' else 2)}"
 
 
 # --- Which recorded events a scenario is, and what its parameters are in them ---

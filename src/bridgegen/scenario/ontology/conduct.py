@@ -63,9 +63,12 @@ def _places() -> Iterator[Rule]:
 
 
 def _pedestrians() -> Iterator[Rule]:
-    why = "Pedestrians walk on sidewalks, and cross roads on crosswalks."
+    why = "Pedestrians walk on sidewalks, and cross roads on crosswalks, unless there is a reason."
     source = f"{_PAPER} (pedestrians walk on crosswalks only)"
-    walker = f"{_PARTICIPANT} {is_a('?value', 'Pedestrian')}"
+    walker = (
+        f"{_PARTICIPANT} {is_a('?value', 'Pedestrian')} "
+        "FILTER NOT EXISTS { ?value bg:has_reason_off_crosswalk ?reason }"
+    )
     crosswalk = (
         f"?crosswalk bg:on_road ?road ; bg:has_distance ?middle ; bg:has_width ?wide . "
         f"{is_a('?crosswalk', 'Crosswalk')} BIND(0.5e0 * ?wide + {_SLACK} AS ?reach)"

@@ -83,6 +83,8 @@ def add_participant(
         put(node, "has_siren", "on")
     if participant.exceeds_limit:
         put(node, "has_reason_to_exceed", participant.exceeds_limit)
+    if participant.off_crosswalk:
+        put(node, "has_reason_off_crosswalk", participant.off_crosswalk)
     _add_body(builder, node, participant.body)
     driver = driver if name == EGO else participant.driver
     if name == EGO or driver in LOOKING:

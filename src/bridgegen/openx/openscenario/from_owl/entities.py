@@ -18,8 +18,12 @@ from bridgegen.scenario.participants import PARTICIPANTS, Body, ParticipantKind
 MAX_SPEED = "max_speed"
 """Property of a pedestrian: the greatest speed [m/s]; the standard has it for vehicles."""
 
-LIFTED = {"has_reason_to_exceed": "exceeds_limit", "has_siren": SIREN}
-"""Names in files of properties of vehicles' individuals."""
+LIFTED = {
+    "has_reason_to_exceed": "exceeds_limit",
+    "has_reason_off_crosswalk": "off_crosswalk",
+    "has_siren": SIREN,
+}
+"""Names in files of properties of participants' individuals."""
 
 _ESMINI_CONTROLLER = "ExternalController"
 
@@ -92,6 +96,7 @@ def _body_of_kind(individuals: Individuals, node: Subject, kind: ParticipantKind
     )
     mass = individuals.optional_number(node, "has_mass")
     model = individuals.optional_text(node, "has_model")
+    lifted = tuple(_lifted(individuals, node))
     if kind.written.element == "Vehicle":
         body = replace(
             body,
@@ -100,18 +105,17 @@ def _body_of_kind(individuals: Individuals, node: Subject, kind: ParticipantKind
             max_acceleration=number("has_max_acceleration"),
             max_deceleration=number("has_max_deceleration"),
         )
-        lifted = tuple(_lifted(individuals, node))
         return entity_body(kind, body, mass=mass, model=model, properties=lifted)
     mass = number("has_mass")
     if kind.written.element == "Pedestrian":
         fastest = individuals.optional_number(node, "has_max_speed")
         said = () if fastest is None else (osc.Property(MAX_SPEED, format_double(fastest)),)
-        return entity_body(kind, body, mass=mass, model=model, properties=said)
+        return entity_body(kind, body, mass=mass, model=model, properties=said + lifted)
     return entity_body(kind, body, mass=mass)
 
 
 def _lifted(individuals: Individuals, node: Subject) -> Iterator[osc.Property]:
-    """Yield the properties that say which rules of the traffic are not for a vehicle."""
+    """Yield the properties that say which rules of the traffic are not for a participant."""
     for key, name in LIFTED.items():
         text = individuals.optional_text(node, key)
         if text is not None:

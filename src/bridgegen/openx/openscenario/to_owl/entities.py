@@ -194,7 +194,7 @@ def _add_body(
     model = MODELS.get(builder.text(body.name))
     if model is not None and PARTICIPANTS[model.type].owl_class == cls:
         builder.put(node, "has_model", model.name)
-    if isinstance(body, osc.Vehicle) and body.properties is not None:
+    if isinstance(body, osc.Vehicle | osc.Pedestrian) and body.properties is not None:
         for key, name in LIFTED.items():
             if (said := body.properties.get(name)) is not None:
                 builder.put(node, key, builder.text(said))
