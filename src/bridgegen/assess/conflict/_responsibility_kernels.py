@@ -167,7 +167,10 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     level = braked_and_stood(scene, 0, e, seen, start, BRAKING, comes)
     # The 4 s are counted in what happened, so an ego that brakes too late, and so meets the other
     # later, would be asked too late; here they count by the speeds of each instant.
-    if (comes or kind == REAR_END_STRIKING) and level != CLEAR and risk < seen < stands:
+    # So are those on foot or wheels who move along the lane ahead: an ego that braked late ran into
+    # them, who had "stepped out".
+    late = comes or kind in (REAR_END_STRIKING, VRU_BY_FRONT)
+    if late and level != CLEAR and risk < seen < stands:
         seen = foreseen_since(scene, e, risk, seen)
         start = located(seen, risk, early)
         level = braked_and_stood(scene, 0, e, seen, start, BRAKING, comes)
