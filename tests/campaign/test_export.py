@@ -74,7 +74,11 @@ EVERY = [f"{one}{more}" for one in names() for more in ("", "-random")]
 every = pytest.mark.parametrize("name", EVERY)
 
 
-INDICATES = ("bus-pulls-out", "bus-pulls-out-random")
+INDICATES = tuple(
+    f"{name}{kind}"
+    for name in ("bus-pulls-out", "oncoming-left-at-signals", "right-turn-on-red")
+    for kind in ("", "-random")
+)
 
 
 @pytest.mark.parametrize("name", INDICATES)

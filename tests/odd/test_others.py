@@ -19,11 +19,14 @@ def drivers(scenario):
 CARELESS = {
     "wrong-way-driver": ["ghost"], "bus-pulls-out": ["bus"], "cyclist-swings-out": ["cyclist"],
     "cyclist-crosses": ["cyclist"], "oncoming-overtaker": ["overtaker"],
+    "drifts-over-line": ["drifting"], "turns-across-from-left": ["turner"],
 }  # fmt: skip
 """Who does not look, for that is what the scenario is about."""
 
 INSISTENT = {
     "red-light-runner": ["runner"], "emergency-vehicle-on-red": ["ambulance"],
+    "stop-sign-runner": ["runner"], "oncoming-left-at-signals": ["turner"],
+    "right-turn-on-red": ["turner"],
     **{name: ["bv"] for name in PAPERS},
 }  # fmt: skip
 """Who gives way to none, likewise, and stops for what stands in its way."""
