@@ -83,7 +83,7 @@ def test_the_list_says_what_is_covered_and_what_is_not(cli):
     code, out, err = cli("list", "scenarios", "--typology")
     assert (code, err) == (0, "")
     text = " ".join(out.split())
-    assert "19 of 37 types, with 65 % of the crashes (shares of harm by type: not known)" in text
+    assert "22 of 37 types, with 72 % of the crashes (shares of harm by type: not known)" in text
     assert "not covered: control loss without a manoeuvre (8.9 %);" in text
     assert "in none of these types: roundabout-entry, wrong-way-driver" in text
     assert "4 of 24 types" in text
