@@ -76,7 +76,10 @@ every = pytest.mark.parametrize("name", EVERY)
 
 INDICATES = tuple(
     f"{name}{kind}"
-    for name in ("bus-pulls-out", "oncoming-left-at-signals", "right-turn-on-red")
+    for name in (
+        "bus-pulls-out", "crosses-to-exit", "lead-breaks-down", "merge-reactions",
+        "oncoming-left-at-signals", "right-turn-on-red",
+    )  # fmt: skip
     for kind in ("", "-random")
 )
 
