@@ -6,7 +6,14 @@ from functools import partial
 import numpy as np
 import pytest
 
-from bridgegen.assess.conflict.analysis import CONTACT, COURSE, NEAR_MISS, ConflictType, Zone, analyse
+from bridgegen.assess.conflict.analysis import (
+    CONTACT,
+    COURSE,
+    NEAR_MISS,
+    ConflictType,
+    Zone,
+    analyse,
+)
 from bridgegen.assess.conflict.harm import decisive
 from bridgegen.assess.conflict.summary import sentence
 from bridgegen.assess.conflict.types import RULES, Responsible, Rule
