@@ -77,9 +77,9 @@ every = pytest.mark.parametrize("name", EVERY)
 INDICATES = tuple(
     f"{name}{kind}"
     for name in (
-        "bus-pulls-out crosses-to-exit lead-breaks-down merge-reactions oncoming-left-at-signals "
-        "right-turn-on-red"
-    ).split()
+        *("bus-pulls-out", "crosses-to-exit", "lead-breaks-down", "merge-reactions"),
+        *("oncoming-left-at-signals", "right-turn-on-red"),
+    )
     for kind in ("", "-random")
 )
 

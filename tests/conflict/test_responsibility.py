@@ -6,17 +6,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from bridgegen.assess.conflict.analysis import (
-    CONTACT,
-    COURSE,
-    NEAR_MISS,
-    ConflictType,
-    Zone,
-    analyse,
-)
+from bridgegen.assess.conflict.analysis import CONTACT, COURSE, NEAR_MISS, ConflictType, analyse
 from bridgegen.assess.conflict.harm import decisive
 from bridgegen.assess.conflict.summary import sentence
-from bridgegen.assess.conflict.types import RULES, Responsible, Rule
+from bridgegen.assess.conflict.types import RULES, Responsible, Rule, Zone
 from bridgegen.drivers.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
 from bridgegen.drivers.preventable import avoids_cut_in
 from bridgegen.drivers.right_of_way import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
