@@ -20,7 +20,8 @@ from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.scenario.language.reader import load, names
 
 MM = 1e-3
-WITHOUT_ANIMALS = [name for name in names() if name != "animal-on-road"]  # CARLA has none
+ANIMALS = ("animal-on-road", "behind-the-corner")  # CARLA has none
+WITHOUT_ANIMALS = [name for name in names() if name not in ANIMALS]
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 from bridgegen.assess.conflict.analysis import CONTACT, COURSE, NEAR_MISS, ConflictType, analyse
 from bridgegen.assess.conflict.harm import decisive
 from bridgegen.assess.conflict.summary import sentence
-from bridgegen.assess.conflict.types import RULES, Responsible, Rule
+from bridgegen.assess.conflict.types import RULES, Responsible, Rule, Zone
 from bridgegen.drivers.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
 from bridgegen.drivers.preventable import avoids_cut_in
 from bridgegen.drivers.right_of_way import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
@@ -194,14 +194,15 @@ def test_who_steps_out_does_not_depend_on_where_the_samples_fall(track, meeting)
     assert max(needed) / min(needed) - 1.0 < 0.002
 
 
-def wrong_way(track, meeting, v, stands, **more):
+def wrong_way(track, meeting, v, stands, tail_first=False, **more):
     """The ego keeps v; a car comes towards it at 10 m/s, has stopped at 5 s and stands so long [s].
 
     It brakes by 5 m/s² from 3 s on; the bodies are 4 m long, so they meet where the ego has driven
     for 5 s and so long.
     """
     speed = np.interp(DT * np.arange(301), [0.0, 3.0, 5.0], [10.0, 10.0, 0.0])
-    ghost = track(x=4.0 + v * (5.0 + stands) + 40.0, h=np.pi, v=speed, t=15.0)  # 30 and 10 m
+    h, speed = (0.0, -speed) if tail_first else (np.pi, speed)
+    ghost = track(x=4.0 + v * (5.0 + stands) + 40.0, h=h, v=speed, t=15.0)  # 30 and 10 m
     return meeting(track(v=v, t=15.0), ghost, claims=[0], **more)
 
 
@@ -248,6 +249,49 @@ def test_an_oncoming_car_that_is_about_to_stop_would_not_have_run_into_who_stops
     assert verdict(rollout) == (BV, Rule.WRONG_SIDE)
     assert analyse(rollout).v_other[0, 1] > 1.0
     assert at_fault(rollout)
+
+
+def test_who_backs_towards_the_ego_is_responsible_and_an_ego_that_could_stop_fails(track, meeting):
+    """Front to rear, not head-on; what braking avoids is as of one that comes nose first."""
+    found = analyse(wrong_way(track, meeting, 20.0, -0.4, tail_first=True))
+    assert found.type[0, 1] == ConflictType.REAR_END_STRIKING
+    assert (found.zone_ego[0, 1], found.zone_other[0, 1]) == (Zone.FRONT, Zone.REAR)
+    about_to_stop = wrong_way(track, meeting, 20.0, -0.4, tail_first=True)
+    assert verdict(about_to_stop) == (BV, Rule.REVERSED)
+    assert at_fault(about_to_stop)
+    backs_on = meeting(track(v=20.0), track(x=104.0, v=-20.0), claims=[0])
+    assert verdict(backs_on) == (BV, Rule.REVERSED)
+    assert not at_fault(backs_on)
+    enough = (stopping_distance(20.0) + 2.0) / 20.0
+    stands = wrong_way(track, meeting, 20.0, enough, tail_first=True)
+    assert verdict(stands) == (EGO, Rule.STANDING_AHEAD)
+    to_ego = meeting(track(v=-5.0), track(x=-60.0, v=5.0), claims=[0])
+    assert verdict(to_ego) == (EGO, Rule.REVERSED)
+
+
+def test_who_backs_across_gives_way_also_from_the_right(track, meeting):
+    def met(h, v):
+        return meeting(track(x=-60.0, v=20.0), track(x=1.0, y=-21.0, h=h, v=v))
+
+    assert verdict(met(0.5 * np.pi, 6.0)) == (EGO, Rule.ASSUMED_RIGHT_BEFORE_LEFT)
+    assert verdict(met(-0.5 * np.pi, -6.0)) == (BV, Rule.REVERSED)
+
+
+def test_oncoming_traffic_in_a_bend_does_not_turn_off(track, meeting):
+    """The ego follows a bend of 100 m to the left, the other leaves it, on 130 m; they meet at 3 s.
+
+    Across a junction, which a map knows by a claim, they would turn.
+    """
+    time = DT * np.arange(round(6.0 / DT) + 1)
+    ego = track(h=0.15 * time, v=15.0)
+    other = track(h=0.45 + np.pi - 15.0 / 130.0 * (time - 3.0), v=15.0)
+    at = round(3.0 / DT)
+    start = {axis: ego[axis][at] - other[axis][at] for axis in "xy"}
+    other |= {axis: other[axis] + start[axis] for axis in "xy"}
+    found = analyse(meeting(ego, other, claims=[0]))
+    assert found.type[0, 1] == ConflictType.HEAD_ON
+    assert verdict(meeting(ego, other, claims=[0])) == (BV, Rule.WRONG_SIDE)
+    assert analyse(meeting(ego, other, claims=[1])).type[0, 1] == ConflictType.TURNING
 
 
 def test_four_seconds_are_counted_by_the_speeds_of_each_instant(track, meeting):

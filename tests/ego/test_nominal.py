@@ -12,6 +12,8 @@ IDEAL = {"perceiving": (), "all ideal": ("perception", "prediction", "control")}
 
 ROUND = {
     "cut-out": (IDEAL, 1),
+    "exit-reactions": (("perceiving",), 1),
+    "follower-closes-in": (("all ideal",), 1),
     "jam-tail-in-fog": (("all ideal",), 1),
     "object-on-road": (IDEAL, 1),
     "wrong-way-driver": (("perceiving",), -1),

@@ -284,8 +284,9 @@ def test_table_lists_every_parameter_with_its_rules():
 def test_the_traffic_of_random_rows_drives_as_drivers_do(name, ego):
     """Until the ego's first contact, the vehicles and bicycles besides it.
 
-    4 m/s² in bends (Mitschke and Wallentowitz), 8.1 m/s² of braking (dry asphalt) and 12.65 m/s³
-    (UN R157) but where they stop or contacts begin; 0.1 s between measured accelerations.
+    4 m/s² in bends (Mitschke and Wallentowitz; what its tyres hold for the car that loses its grip
+    in goes-wide-in-bend), 8.1 m/s² of braking (dry asphalt) and 12.65 m/s³ (UN R157) but where they
+    stop or contacts begin; 0.1 s between measured accelerations.
 
     Weather is even here. As it is met, more of it is dry and vehicles are faster: of 384 rows, 3 of
     cut-out then exceed the limit in bends (to 4.3 m/s²), 5 of left-across-path that of jerk (to 30
@@ -309,7 +310,8 @@ def test_the_traffic_of_random_rows_drives_as_drivers_do(name, ego):
             if len(rollout.present):
                 end = min([end, *np.flatnonzero(~rollout.present[i, e])[:1].tolist()])
             v, h = rollout.v[i, e, :end], rollout.h[i, e, :end]
-            assert (np.abs(h[5:] - h[:-5]) / (5 * dt) * 0.5 * np.abs(v[5:] + v[:-5])).max() < 4.1
+            across = np.abs(h[5:] - h[:-5]) / (5 * dt) * 0.5 * np.abs(v[5:] + v[:-5])
+            assert across.max() < (0.85 * 9.81 if rollout.names[e] == "sliding" else 4.1)
             a = np.diff(v) / dt
             assert a.min() > -8.1
             stands = np.convolve(np.abs(v) < 0.05, np.ones(4), "valid") > 0.0

@@ -20,6 +20,10 @@ CARELESS = {
     "wrong-way-driver": ["ghost"], "bus-pulls-out": ["bus"], "cyclist-swings-out": ["cyclist"],
     "cyclist-crosses": ["cyclist"], "oncoming-overtaker": ["overtaker"],
     "drifts-over-line": ["drifting"], "turns-across-from-left": ["turner"],
+    "crosses-to-exit": ["crosser"], "evades-into-lane": ["evading"],
+    "exit-reactions": ["lead", "follower"], "merge-reactions": ["lead", "follower", "truck"],
+    "follower-closes-in": ["follower"], "goes-wide-in-bend": ["sliding"],
+    "oncoming-drifts": ["drifting"], "overtaker-loses-control": ["overtaker"],
 }  # fmt: skip
 """Who does not look, for that is what the scenario is about."""
 

@@ -15,6 +15,7 @@ from bridgegen.assess.conflict._circumstances_kernels import stops_at_red
 from bridgegen.assess.conflict._codes import (
     ACROSS,
     ALONG,
+    ASSUMED_RIGHT_BEFORE_LEFT,
     CONTACT,
     COURSE,
     EGO,
@@ -22,27 +23,34 @@ from bridgegen.assess.conflict._codes import (
     FRONT,
     FRONT_LEFT,
     FRONT_RIGHT,
+    HEAD_ON,
     INSTANT,
     KIND,
     LEADS_EGO,
+    LEFT_ITS_LANE,
     NEAR_MISS,
     NEARNESS,
     NEEDED,
     NO_ZONE,
+    OTHER,
     OVERLAP,
     PREVENTABLE,
     REAR_END_STRIKING,
     REAR_END_STRUCK,
     RESPONSIBLE,
+    REVERSED,
+    RULE,
     SHARED,
     SIDE_SWIPE,
     STOOD_EGO,
     STOOD_OTHER,
     TTC,
+    TURNING_GIVES_WAY,
     TYPE,
     V_EGO,
     V_OTHER,
     VRU_INTO_SIDE,
+    WRONG_SIDE,
     ZONE_EGO,
     ZONE_OTHER,
 )
@@ -279,7 +287,8 @@ def analyse_pair(
     stood = stood_for(v[0], 0, k, dt)
     if stood == 0.0 and v[0, k] <= CREEPS and a[0, k] <= -COMFORT:
         stood = dt
-    kind = type_of(e, first, until, k, dt, kinds, c, s, own, its, own_part, stood)
+    along = routed and claims[e] == 0
+    kind = type_of(e, first, until, k, dt, kinds, c, s, own, its, own_part, stood, along)
     scene = Scene(
         half, kinds, x, y, c, s, v, a, offset, distance, gone, claims, crosswalks, friction,
         stop_entities, stop_lights, stop_lines, lights, lamps, routed, first, until, dt,
@@ -322,13 +331,27 @@ def turned_round(zone):
 
 @kernel
 def name_zones(reverses, whole):
-    """Name the zones of bodies that reverse, ``(E, T)``; none where it is empty."""
+    """Name the zones of bodies that reverse, ``(E, T)``; none where it is empty.
+
+    They were judged as if they drove ahead. One that backs towards the other is not oncoming, and
+    who backs gives way, without a rule that says more.
+    """
     for e in range(len(reverses)):
         instant = whole[e, INSTANT]
-        if reverses[0, instant]:
+        mine, its = reverses[0, instant], reverses[e, instant]
+        if mine:
             whole[e, ZONE_EGO] = turned_round(whole[e, ZONE_EGO])
-        if reverses[e, instant]:
+        if its:
             whole[e, ZONE_OTHER] = turned_round(whole[e, ZONE_OTHER])
+        if mine == its:
+            continue
+        if whole[e, TYPE] == HEAD_ON:
+            whole[e, TYPE] = REAR_END_STRIKING if its else REAR_END_STRUCK
+        party, rule = OTHER if its else EGO, whole[e, RULE]
+        if rule in (WRONG_SIDE, TURNING_GIVES_WAY, ASSUMED_RIGHT_BEFORE_LEFT) or (
+            rule == LEFT_ITS_LANE and whole[e, RESPONSIBLE] == party
+        ):
+            whole[e, RESPONSIBLE], whole[e, RULE] = party, REVERSED
 
 
 @kernel

@@ -72,11 +72,13 @@ def turns(c, s, e, first, n, k, dt):
 
 
 @kernel
-def type_of(e, first, n, k, dt, kinds, c, s, own, its, own_part, stood):
+def type_of(e, first, n, k, dt, kinds, c, s, own, its, own_part, stood, along):
     """Return the type of the conflict of the ego and body e, which meet after instant k.
 
     ``own`` and ``its`` are the zones that meet; ``own_part`` [m/s] is the ego's share of the
-    closing speed; ``stood`` [s] is how long the ego has been standing.
+    closing speed; ``stood`` [s] is how long the ego has been standing; ``along``: both drive on
+    lanes that share no junction, so that those in opposite directions follow a bend, and do not
+    turn off.
     """
     cosine = c[0, k] * c[e, k] + s[0, k] * s[e, k]
     if stood > 0.0:
@@ -85,6 +87,8 @@ def type_of(e, first, n, k, dt, kinds, c, s, own, its, own_part, stood):
         return VRU_BY_FRONT if strikes_with_front(own, own_part) else VRU_INTO_SIDE
     if IS_OBSTACLE[kinds[e]]:
         return OBJECT
+    if cosine <= -SAME_WAY and along:
+        return HEAD_ON
     mine, theirs = turns(c, s, e, first, n, k, dt)
     if cosine >= SAME_WAY:
         if own == REAR or (its == FRONT and own_part <= PUSHES):

@@ -144,6 +144,7 @@ class Rule(IntEnum):
     DID_NOT_KEEP_LANE = _codes.DID_NOT_KEEP_LANE
     LEFT_THE_ROAD = _codes.LEFT_THE_ROAD
     CUT_IN_REQUIRED = _codes.CUT_IN_REQUIRED
+    REVERSED = _codes.REVERSED
 
     @property
     def label(self) -> str:
@@ -258,6 +259,10 @@ RULES = {
         "did not avoid a cut-in that a system must avoid: it came over the marking at more than "
         "v / 12 m/s² + 0.35 s to collision, v being the closing speed",
         "UN R157, 5.2.5.2",
+    ),
+    Rule.REVERSED: (
+        "reversed towards the other, or across its way",
+        "Vienna Convention, Art. 14 (2); StVO § 9 (5)",
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",
