@@ -20,7 +20,6 @@ from bridgegen.assess.conflict._circumstances_kernels import (
     ahead_until,
     ego_came_over,
     ego_moved,
-    has_reason,
     has_set_off,
     on_crosswalk_since,
     ran_red,
@@ -29,8 +28,12 @@ from bridgegen.assess.conflict._circumstances_kernels import (
     slowing_since,
     steering,
     still_since,
+    strip,
+    unjustified,
 )
 from bridgegen.assess.conflict._codes import (
+    ACROSS,
+    ALONG,
     ASSUMED_RIGHT_BEFORE_LEFT,
     BRAKED_HARD_AHEAD,
     BRAKED_WITHOUT_REASON,
@@ -49,11 +52,14 @@ from bridgegen.assess.conflict._codes import (
     FRONT_LEFT,
     FRONT_RIGHT,
     HEAD_ON,
+    INSTANT,
     INTO_THE_SIDE,
     JUNCTION_OCCUPIED,
+    KIND,
     LEFT_ITS_LANE,
     LEFT_TO_ACT,
     MAP_PRIORITY,
+    NEEDED,
     NEITHER,
     OBJECT,
     OTHER,
@@ -79,10 +85,17 @@ from bridgegen.assess.conflict._codes import (
     TTC,
     TURNING,
     TURNING_GIVES_WAY,
+    TYPE,
+    UNJUSTIFIED_BRAKING,
     UNSAFE_START,
+    V_EGO,
+    V_OTHER,
+    VIOLATION,
     VRU_BY_FRONT,
     VRU_INTO_SIDE,
     WRONG_SIDE,
+    ZONE_EGO,
+    ZONE_OTHER,
 )
 from bridgegen.assess.conflict._geometry_kernels import (
     beside,
@@ -109,10 +122,12 @@ from bridgegen.assess.conflict._limits import (
     MARGIN_ON_FOOT,
     MOVES,
     OFF_LANE,
+    SAME_WAY,
     STANDS,
     STOOD,
     SYSTEM_BRAKING,
     SYSTEM_REACTION,
+    TOO_CLOSE,
     TURN_TIME,
     UNSURE,
 )
@@ -307,7 +322,7 @@ def decide(
     # The order of these rules is that of the table in docs/conflicts.md: the first that applies
     # decides.
     if kind == EGO_STANDING:
-        return of_standing(scene, e, k, whole)
+        return of_standing(scene, e, k, own, whole)
     if kind != REAR_END_STRIKING and kind != REAR_END_STRUCK:
         last = ahead_until(scene, k, real[TTC]) if scene.near else k
         mine, its = ran_red(scene, 0, k, last), ran_red(scene, e, k, last)
@@ -341,7 +356,7 @@ def decide(
 
 
 @kernel
-def of_standing(scene, e, k, whole):
+def of_standing(scene, e, k, own, whole):
     """Decide where the other drives into the ego, which stands.
 
     One that has priority need not brake harder than `COMFORT`, neither from when the ego came into
@@ -356,6 +371,11 @@ def of_standing(scene, e, k, whole):
             if braked(scene, e, 0, since, located(since, came, early), COMFORT) == COLLIDES:
                 whole[DECIDED] = since
                 return EGO, rule_of(claim)
+    ahead = scene.c[0, k] * scene.c[e, k] + scene.s[0, k] * scene.s[e, k] >= SAME_WAY
+    if ahead and own in (REAR, REAR_LEFT, REAR_RIGHT):
+        who = of_braking(scene, e, k, whole)
+        if who != NEITHER:
+            return who, BRAKED_WITHOUT_REASON
     return OTHER, STRUCK_STANDING
 
 
@@ -459,13 +479,66 @@ def of_struck(scene, e, k, whole):
         if claim == 0:
             return EGO, (CUT_IN if moved else TURNING_GIVES_WAY)
         return OTHER, rule_of(claim)
-    # StVO § 4 (1): who drives ahead must not brake hard without a reason, but the one behind keeps
-    # its distance all the same: both are responsible.
-    for i in range(max(k - int(JUST_NOW / scene.dt), 0), k):
-        if scene.a[0, i] <= -HARD and scene.v[0, i] > STANDS and not has_reason(scene, i):
-            whole[DECIDED] = i
-            return SHARED, BRAKED_WITHOUT_REASON
-    return OTHER, REAR_DISTANCE
+    who = of_braking(scene, e, k, whole)
+    return (OTHER, REAR_DISTANCE) if who == NEITHER else (who, BRAKED_WITHOUT_REASON)
+
+
+@kernel
+def of_braking(scene, e, k, whole):
+    """Return who is responsible if the ego has braked hard without a reason just before k.
+
+    StVO § 4 (1): who drives ahead must not do so; the one behind keeps a distance from which it
+    can stop all the same, and shares it where it did not, or could have stopped.
+    """
+    i = unjustified(scene, k - int(JUST_NOW / scene.dt), k)
+    if i < 0:
+        return NEITHER
+    whole[DECIDED], whole[TYPE] = i, UNJUSTIFIED_BRAKING
+    # What a recorded ego braked for may not have been recorded.
+    could = scene.friction == math.inf or braked(scene, e, 0, i, float(i), BRAKING) == CLEAR
+    return SHARED if could or tailgates(scene, e, i) else EGO
+
+
+@kernel
+def tailgates(scene, e, k):
+    """Return whether body e, behind the ego, is too close to it at instant k."""
+    return scene.distance[e, k] < TOO_CLOSE * scene.v[e, k]
+
+
+@kernel
+def force(scene, e, end, whole, real):
+    """Make a violation of it where the ego brakes hard without a reason, and e behind it must, too.
+
+    Of all such the one that asks the hardest braking of e, more than `COMFORT`. Of a recording,
+    which states no friction, none: what its ego braked for may be missing.
+    """
+    a, v, worst, k = scene.a, scene.v, COMFORT, 0
+    after = int(JUST_NOW / scene.dt)
+    while k < end and scene.friction < math.inf:
+        begin = k
+        while k < end and a[0, k] <= -HARD:
+            k += 1
+        if k == begin:
+            k += 1
+            continue
+        along, aside = strip(scene, e, 0, begin)
+        if along <= 0.0 or aside > 0.0 or not scene.distance[e, begin] < HORIZON * v[e, begin]:
+            continue
+        hardest, at, slowest = 0.0, begin, v[0, begin]
+        for i in range(begin, min(k + after, end)):
+            slowest = min(slowest, v[0, i])
+            if -a[e, i] > hardest:
+                hardest, at = -a[e, i], i
+        if hardest <= worst or unjustified(scene, begin, k) < 0:
+            continue
+        worst = hardest
+        whole[KIND], whole[TYPE], whole[RULE] = VIOLATION, UNJUSTIFIED_BRAKING, BRAKED_WITHOUT_REASON
+        whole[RESPONSIBLE] = SHARED if tailgates(scene, e, begin) else EGO
+        whole[INSTANT], whole[DECIDED] = at, begin
+        whole[ZONE_EGO], whole[ZONE_OTHER] = REAR, FRONT
+        real[TTC], real[NEEDED], real[ALONG] = math.inf, hardest, 0.0
+        real[ACROSS] = max(v[e, begin] - slowest, 0.0)  # as if it had not braked
+        real[V_EGO], real[V_OTHER] = v[0, begin], v[e, begin]
 
 
 @kernel

@@ -67,6 +67,11 @@ NOISE_KEY = "noise_key"
 it follows from the values of the file's parameters."""
 
 
+GHOST = "ghost"
+"""Property of a controller, ``ghost.NAME.KEY``: what its sensors report and is not there, by the
+keys of `bridgegen.scenario.language.story.Ghost`."""
+
+
 @dataclass(frozen=True)
 class Property(Element):
     """A name and a value that the standard leaves to the user."""
