@@ -322,9 +322,9 @@ def analyse_row(
             scene = Scene(
                 half, kinds, x, y, c, s, v, a, offset, distance, gone, claims[0], crosswalks,
                 friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed, 0, n, dt,
-                n - 1, end, False,
+                n - 1, min(end, n - 1), False,
             )  # fmt: skip
-            force(scene, e, end, whole[e], real[e])
+            force(scene, e, whole[e], real[e])
 
 
 @kernel

@@ -111,6 +111,7 @@ from bridgegen.assess.conflict._limits import (
     COMFORT,
     DOUBTS,
     EVIDENT_EVERY,
+    HALVINGS,
     HARD,
     HORIZON,
     JUST_BEFORE,
@@ -506,17 +507,34 @@ def tailgates(scene, e, k):
 
 
 @kernel
-def force(scene, e, end, whole, real):
-    """Make a violation of it where the ego brakes hard without a reason, and e behind it must, too.
+def asked(scene, e, k):
+    """Return the least deceleration by which e, braking for the ego from instant k, avoids it.
 
-    Of all such the one that asks the hardest braking of e, more than `COMFORT`. Of a recording,
-    which states no friction, none: what its ego braked for may be missing.
+    In m/s²: 0 up to `COMFORT`, `BRAKING` where that does not suffice.
     """
-    a, v, worst, k = scene.a, scene.v, COMFORT, 0
-    after = int(JUST_NOW / scene.dt)
-    while k < end and scene.friction < math.inf:
+    low, high = COMFORT, BRAKING
+    if braked(scene, e, 0, k, float(k), low) != COLLIDES:
+        return 0.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if braked(scene, e, 0, k, float(k), middle) == COLLIDES:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+@kernel
+def force(scene, e, whole, real):
+    """Make it a violation if the ego brakes hard without a reason, and forces e behind it to, too.
+
+    Of all such the one that asks the hardest braking of e. Of a recording, which states no
+    friction, there is none: what its ego braked for may be missing.
+    """
+    a, v, worst, k = scene.a, scene.v, 0.0, 0
+    while k < scene.at and scene.friction < math.inf:
         begin = k
-        while k < end and a[0, k] <= -HARD:
+        while k < scene.at and a[0, k] <= -HARD:
             k += 1
         if k == begin:
             k += 1
@@ -524,19 +542,20 @@ def force(scene, e, end, whole, real):
         along, aside = strip(scene, e, 0, begin)
         if along <= 0.0 or aside > 0.0 or not scene.distance[e, begin] < HORIZON * v[e, begin]:
             continue
-        hardest, at, slowest = 0.0, begin, v[0, begin]
-        for i in range(begin, min(k + after, end)):
-            slowest = min(slowest, v[0, i])
-            if -a[e, i] > hardest:
-                hardest, at = -a[e, i], i
-        if hardest <= worst or unjustified(scene, begin, k) < 0:
+        needed = asked(scene, e, begin)
+        if needed <= worst or unjustified(scene, begin, k) < 0:
             continue
-        worst = hardest
-        whole[KIND], whole[TYPE], whole[RULE] = VIOLATION, UNJUSTIFIED_BRAKING, BRAKED_WITHOUT_REASON
+        worst, at, slowest = needed, begin, v[0, begin]
+        for i in range(begin, min(k + int(JUST_NOW / scene.dt), scene.at)):
+            slowest = min(slowest, v[0, i])
+            if scene.distance[e, i] < scene.distance[e, at]:
+                at = i
+        whole[KIND], whole[TYPE] = VIOLATION, UNJUSTIFIED_BRAKING
+        whole[RULE] = BRAKED_WITHOUT_REASON
         whole[RESPONSIBLE] = SHARED if tailgates(scene, e, begin) else EGO
         whole[INSTANT], whole[DECIDED] = at, begin
         whole[ZONE_EGO], whole[ZONE_OTHER] = REAR, FRONT
-        real[TTC], real[NEEDED], real[ALONG] = math.inf, hardest, 0.0
+        real[TTC], real[NEEDED], real[ALONG] = math.inf, needed, 0.0
         real[ACROSS] = max(v[e, begin] - slowest, 0.0)  # as if it had not braked
         real[V_EGO], real[V_OTHER] = v[0, begin], v[e, begin]
 

@@ -115,7 +115,7 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
             needed = conflicts.needed[row, other]
             return (
                 f"The ego braked hard at {v:.1f} m/s, and {name} behind it had to brake by "
-                f"{needed:.1f} m/s²"
+                f"{needed:.1f} m/s² at least"
             )
         left = "the road" if kind == ConflictType.ROAD_DEPARTURE else "its lane"
         side = "left" if aside > 0.0 else "right"
