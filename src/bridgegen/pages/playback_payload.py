@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.assess.metrics.distances import first_closest
-from bridgegen.base.arrays import Float
+from bridgegen.base.arrays import Float, Int
+from bridgegen.drivers import kinds as column
 from bridgegen.pages.findings_payload import conflict_payload
 from bridgegen.pages.playback import Beside, Course, Lamp, Planned, Playback, Sensed, Weather
 from bridgegen.pages.series import packed
@@ -156,6 +157,26 @@ def _weather(weather: Weather) -> dict[str, Any]:
     }
 
 
+def _phantom(ghost: Float, steps: Int, p: Playback) -> list[list[int]]:
+    """Return a ghost's detections: the frame, centre, heading, length and width, and its kind.
+
+    The centre is that from the ego's reference point.
+    """
+    frames = np.flatnonzero(ghost[:, column.SEEN_BY] == column.GHOST)
+    x, y = (
+        ghost[frames, at] - here[0, steps[frames]]
+        for at, here in ((column.X, p.x), (column.Y, p.y))
+    )
+    columns = [
+        x * SCALE["length"], y * SCALE["length"], ghost[frames, column.HEADING] * SCALE["h"],
+        ghost[frames, column.LENGTH] * SCALE["length"],
+        ghost[frames, column.WIDTH] * SCALE["width"], ghost[frames, column.KIND],
+    ]  # fmt: skip
+    numbers = np.round(np.column_stack((frames, *columns))).astype(np.int64)
+    found: list[list[int]] = numbers.tolist()
+    return found
+
+
 def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:
     """Return detections: a letter per entity and frame, and six numbers of each detection.
 
@@ -198,6 +219,7 @@ def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:
     return {
         "steps": np.diff(steps, prepend=0).tolist(),
         "entities": entities,
+        "phantoms": [_phantom(ghost[kept], steps, p) for ghost in s.ghosts],
         "kinds": list(s.kinds),
         "tolerance": s.tolerance,
     }

@@ -29,6 +29,7 @@ from bridgegen.scenario.language.story import (
     CONDITIONS,
     ConditionSpec,
     EventSpec,
+    Ghost,
     Jam,
     Participant,
     RoadWorks,
@@ -51,7 +52,19 @@ def story_lines(scenario: LogicalScenario) -> Iterator[str]:
             yield _participant(participant, scenario)
     yield from (_jam(jam, scenario) for jam in scenario.story.jams)
     yield from (_works(works) for works in scenario.story.works)
+    yield from (_ghost(ghost) for ghost in scenario.story.ghosts)
     yield from (_event(event) for event in scenario.events)
+
+
+def _ghost(ghost: Ghost) -> str:
+    where = f"{in_words(ghost.at, 'm')} along its route" if ghost.at is not None else "at random"
+    if ghost.rate is not None:
+        where += f" ({in_words(ghost.rate, '1/m')})"
+    return (
+        f"{ghost.name}: the ego's sensors report a {ghost.type} {where}, where nothing is, from "
+        f"{in_words(ghost.appears, 'm')} to {in_words(ghost.vanishes, 'm')} ahead, for "
+        f"{in_words(ghost.lifetime, 's')} at most"
+    )
 
 
 def _participant(participant: Participant, scenario: LogicalScenario) -> str:

@@ -295,14 +295,17 @@ def asks(scene, o, k):
 def unjustified(scene, begin, end):
     """Return the first of the instants at which the ego brakes hard without a reason; -1: none.
 
-    A reason counts from `LATELY` before to `REACTION` after: brakes are released late, and one may
-    brake for what comes.
+    A reason counts from `LATELY` before the braking began, `HORIZON` before at most, to `REACTION`
+    after: harder braking than it asks for ends the need for it, and one may brake for what comes.
     """
     every = max(int(EVIDENT_EVERY / scene.dt + 0.5), 1)
     for i in range(max(begin, 0), end):
         if scene.a[0, i] > -HARD or scene.v[0, i] <= STANDS:
             continue
-        first = max(i - int(LATELY / scene.dt), 0)
+        first, earliest = i, max(i - int(HORIZON / scene.dt), 0)
+        while first > earliest and scene.a[0, first - 1] <= -BRAKE_LIGHTS_FROM:
+            first -= 1
+        first = max(first - int(LATELY / scene.dt), 0)
         last = min(i + int(REACTION / scene.dt), scene.n - 1)
         reason = has_reason(scene, i)
         for j in range(first, last + 1, every):

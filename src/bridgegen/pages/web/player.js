@@ -175,7 +175,7 @@ export class Player {
     }
     if (has.elsewhere) $("elsewhere-means").textContent = [...new Set(ghostsOf(this.kept).map(({ means }) => means))].join("; ");
     if (has.elsewhere) $("elsewhere-button").textContent = ghostsOf(this.kept).some(({ simulator }) => simulator) ? "Elsewhere" : "Other driver";
-    if (this.kept.sensed) $("displaced-means").textContent = `displaced by over ${this.kept.sensed.tolerance} m`;
+    if (this.kept.sensed) $("displaced-means").textContent = `displaced by over ${this.kept.sensed.tolerance} m${this.kept.sensed.phantoms.length ? ", or nothing is there" : ""}`;
   }
 
   // Who is which colour, for the legend.

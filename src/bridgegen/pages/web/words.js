@@ -3,7 +3,7 @@
 import { intentionAt } from "./course.js";
 import { isPlaced, playersOf } from "./geometry.js";
 import { elsewhereWords } from "./ghosts.js";
-import { SIGNALS, detectionAt, lightAt, showsAt, weatherAt } from "./unpack.js";
+import { SIGNALS, detectionAt, lightAt, phantomsAt, showsAt, weatherAt } from "./unpack.js";
 
 const INDICATORS = ["", "indicates left", "indicates right", "hazard lights on"];
 
@@ -44,6 +44,7 @@ export function stateWords(kept, state) {
     const told = [...lampWords(showsAt(kept.entities[e], state.index)), detectionWords(detectionAt(kept, e, state.index))].filter(Boolean);
     parts.push([`${s.name} ${value(s.v, "m/s", 1)}`, ...told].join(", "));
   }
+  for (const { kind, dx, dy } of phantomsAt(kept, state.index)) parts.push(`sensors report a ${kind} ${Math.hypot(dx, dy).toFixed(0)} m away, where nothing is`);
   state.entities.forEach((s, e) => {
     const off = elsewhereWords(kept, state, e);
     if (off) parts.push(`${s.name} ${off}`);
