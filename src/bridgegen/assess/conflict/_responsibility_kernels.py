@@ -372,8 +372,7 @@ def of_standing(scene, e, k, own, whole):
             if braked(scene, e, 0, since, located(since, came, early), COMFORT) == COLLIDES:
                 whole[DECIDED] = since
                 return EGO, rule_of(claim)
-    ahead = scene.c[0, k] * scene.c[e, k] + scene.s[0, k] * scene.s[e, k] >= SAME_WAY
-    if ahead and own in (REAR, REAR_LEFT, REAR_RIGHT):
+    if goes_along(scene, e, k) and own in (REAR, REAR_LEFT, REAR_RIGHT):
         who = of_braking(scene, e, k, whole)
         if who != NEITHER:
             return who, BRAKED_WITHOUT_REASON
@@ -501,6 +500,12 @@ def of_braking(scene, e, k, whole):
 
 
 @kernel
+def goes_along(scene, e, k):
+    """Return whether body e and the ego go the same way at instant k."""
+    return scene.c[0, k] * scene.c[e, k] + scene.s[0, k] * scene.s[e, k] >= SAME_WAY
+
+
+@kernel
 def tailgates(scene, e, k):
     """Return whether body e, behind the ego, is too close to it at instant k."""
     return scene.distance[e, k] < TOO_CLOSE * scene.v[e, k]
@@ -540,7 +545,8 @@ def force(scene, e, whole, real):
             k += 1
             continue
         along, aside = strip(scene, e, 0, begin)
-        if along <= 0.0 or aside > 0.0 or not scene.distance[e, begin] < HORIZON * v[e, begin]:
+        behind = along > 0.0 and aside == 0.0 and goes_along(scene, e, begin)
+        if not (behind and scene.distance[e, begin] < HORIZON * v[e, begin]):
             continue
         needed = asked(scene, e, begin)
         if needed <= worst or unjustified(scene, begin, k) < 0:

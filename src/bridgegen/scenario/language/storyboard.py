@@ -257,8 +257,6 @@ class Storyboard:
                 self._report(f"a ghost's name is a word, got '{name}'", path)
             if (given.at is None) == (given.rate is None):
                 self._report(f"ghost {name} must have a place (at) or a rate, one of the two", path)
-            if given.type not in TYPES:
-                self._report(f"a ghost is taken for one of {', '.join(TYPES)}", (*path, "type"))
             values = {name: getattr(given, name) for name in GHOST_UNITS}
             for word, unit in GHOST_UNITS.items():
                 if values[word] is not None:
