@@ -41,7 +41,11 @@ def ego(**how):
 
 def test_who_must_brake_hard_behind_it_is_forced():
     found, kind, who = judged(ego(least=8.0), follower(22.0, least=8.0))
-    assert (found.kind[0, 1], kind, who) == (VIOLATION, ConflictType.UNJUSTIFIED_BRAKING, Responsible.EGO)
+    assert (found.kind[0, 1], kind, who) == (
+        VIOLATION,
+        ConflictType.UNJUSTIFIED_BRAKING,
+        Responsible.EGO,
+    )
     # It keeps 20 m/s for 0.75 s; what is left of 22 m and of the ego's way asks for more than 3.
     assert limits.COMFORT < found.needed[0, 1] < limits.HARD
     assert 0.1 < decisive(found)[1][0] < 0.3
@@ -65,7 +69,11 @@ def test_who_drives_far_behind_is_not_forced():
 def test_struck_though_nobody_could_have_stopped_is_the_egos_alone():
     # 19 m are 0.95 s: not too close by law; the careful driver needs 1.05 s behind 8 m/s².
     found, kind, who = judged(ego(), follower(19.0, reaction=1.5))
-    assert (found.kind[0, 1], kind, who) == (CONTACT, ConflictType.UNJUSTIFIED_BRAKING, Responsible.EGO)
+    assert (found.kind[0, 1], kind, who) == (
+        CONTACT,
+        ConflictType.UNJUSTIFIED_BRAKING,
+        Responsible.EGO,
+    )
     assert found.rule[0, 1] == Rule.BRAKED_WITHOUT_REASON
     assert found.at_fault[0, 1]
     assert decisive(found)[1][0] > 0.3
@@ -93,7 +101,9 @@ def test_a_recording_may_lack_what_was_braked_for():
 )
 @example(v=36.0, rate=9.0, gap=20.0, share=1.0, aside=2.4, on_foot=False)
 @example(v=6.0, rate=5.1, gap=0.5, share=0.0, aside=-2.4, on_foot=True)
-def test_a_body_in_the_way_within_the_stopping_distance_justifies(v, rate, gap, share, aside, on_foot):
+def test_a_body_in_the_way_within_the_stopping_distance_justifies(
+    v, rate, gap, share, aside, on_foot
+):
     """Law: whatever the follower does and wherever the body stands, the ego is not blamed."""
     stops = v * limits.REACTION + v * v / (2.0 * limits.HARD)
     ahead = 2.0 + max(share * stops, 0.1) + 2.0  # from the ego's middle at 1 s to the body's
@@ -125,7 +135,5 @@ def test_what_is_a_reason(other, is_reason):
 def test_a_body_in_the_bend_ahead_is_a_reason():
     """80 m of radius from where the ego is; the body stands on the arc, turned along it."""
     angle = 30.0 / 80.0
-    body = drive(
-        x=22.0 + 80.0 * np.sin(angle), y=80.0 * (1.0 - np.cos(angle)), h=angle, t=8.0
-    )
+    body = drive(x=22.0 + 80.0 * np.sin(angle), y=80.0 * (1.0 - np.cos(angle)), h=angle, t=8.0)
     assert judged(ego(), follower(12.0), body)[1] != ConflictType.UNJUSTIFIED_BRAKING

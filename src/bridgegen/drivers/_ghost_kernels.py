@@ -14,34 +14,14 @@ identification for collision avoidance systems, IEEE IV (2011).
 
 from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
+from bridgegen.drivers import _physics_kernels as physics
 from bridgegen.drivers import _tracking_kernels as tracking
+from bridgegen.drivers import kinds as column
 from bridgegen.drivers._occlusion_kernels import DX, DY, D
 from bridgegen.drivers._path_kernels import pose
 from bridgegen.drivers._perception_kernels import COLOURED, blank, frame_at
-from bridgegen.drivers._physics_kernels import (
-    BOX_ERROR,
-    CAMERA_FLOOR,
-    DROPOUT_TIME,
-    ERROR_TIME,
-    FRAME,
-    HEADING_ERROR,
-    LIDAR_CONFIDENCE,
-)
 from bridgegen.drivers._random_kernels import block, unit
 from bridgegen.drivers._sensor_kernels import LIDAR_ACROSS, LIDAR_ALONG, SIZE, TURN, draw
-from bridgegen.drivers.kinds import (
-    CONFIDENCE,
-    GHOST,
-    HEADING,
-    KIND,
-    LENGTH,
-    MISSED,
-    NO_FRAME,
-    SEEN_BY,
-    WIDTH,
-    X,
-    Y,
-)
 
 AT, RATE, APPEARS, VANISHES, LIFETIME, LONG, WIDE, WHAT = range(8)
 """Columns of ``Plan.ghosts`` ``(G, 8)``: slots of the station of its near end after the ego's start
@@ -63,7 +43,7 @@ def is_reported(frame, moved, row, slots, front, key, e, memory):
     ``moved`` [m] is how far the ego has come since the frame before, ``front`` the station [m] of
     its front.
     """
-    now = frame * FRAME
+    now = frame * physics.FRAME
     nearest, farthest = slots[row[VANISHES]], slots[row[APPEARS]]
     if memory[e, LIVES] == 0.0 and row[AT] >= 0:
         if nearest <= memory[e, STATION] - front <= farthest:
@@ -87,23 +67,23 @@ def haunt(k, plan, roads, state, record):
 
     Ideal perception has none. Off its first route the ego meets none.
     """
-    body, tracks, memory = plan.bodies[0], state.tracks, state.sensors
+    tracks, memory, frame = state.tracks, state.sensors, frame_at(k, plan.dt)
+    elapsed = max(plan.dt, physics.FRAME)
+    renew = 1.0 - elementary.exp(-elapsed / physics.DROPOUT_TIME)
+    keep = elementary.exp(-elapsed / physics.ERROR_TIME)
+    front = state.station[0] + plan.bodies[0, 2] + 0.5 * plan.bodies[0, 0]
     for g in range(plan.ghosts.shape[0]):
         row, e = plan.ghosts[g], record.x.shape[0] + g
-        frame = frame_at(k, plan.dt)
-        blank(record.detections, e, k, MISSED if frame >= 0 else NO_FRAME)
+        blank(record.detections, e, k, column.MISSED if frame >= 0 else column.NO_FRAME)
         if plan.ideal_perception:
             continue
-        if k > 0:
+        if k == 0 and row[AT] >= 0:
+            memory[e, STATION] = state.station[0] + state.slots[row[AT]]
+        elif k > 0:
             tracking.advance(tracks, memory, e, plan.dt)
         if frame < 0:
             continue
-        elapsed = max(plan.dt, FRAME)
-        renew = 1.0 - elementary.exp(-elapsed / DROPOUT_TIME)
-        draw(memory, e, state.key[0], frame, renew, elementary.exp(-elapsed / ERROR_TIME))
-        front = state.station[0] + body[2] + 0.5 * body[0]
-        if k == 0 and row[AT] >= 0:
-            memory[e, STATION] = state.station[0] + state.slots[row[AT]]
+        draw(memory, e, state.key[0], frame, renew, keep)
         moved = record.v[0, k] * elapsed
         if state.on[0] != 0 or not is_reported(
             frame, moved, row, state.slots, front, state.key[0], e, memory
@@ -111,18 +91,16 @@ def haunt(k, plan, roads, state, record):
             tracking.miss(tracks, memory, e)
             continue
         length, width = state.slots[row[LONG]], state.slots[row[WIDE]]
-        x, y, h = pose(
-            roads.paths[0], roads.counts[0], roads.steps[0], memory[e, STATION] + 0.5 * length
-        )
-        stretch = max(1.0 + BOX_ERROR * memory[e, SIZE], 0.5)
+        middle = memory[e, STATION] + 0.5 * length
+        x, y, h = pose(roads.paths[0], roads.counts[0], roads.steps[0], middle)
+        error, stretch = physics.CAMERA_FLOOR, max(1.0 + physics.BOX_ERROR * memory[e, SIZE], 0.5)
+        x, y = x + error * memory[e, LIDAR_ALONG], y + error * memory[e, LIDAR_ACROSS]
+        h += physics.HEADING_ERROR * memory[e, TURN]
+        length, width, sure = length * stretch, width * stretch, physics.LIDAR_CONFIDENCE
         seen = record.detections[e, k]
-        seen[SEEN_BY], seen[KIND], seen[CONFIDENCE] = GHOST, row[WHAT], LIDAR_CONFIDENCE
-        seen[X] = x + CAMERA_FLOOR * memory[e, LIDAR_ALONG]
-        seen[Y] = y + CAMERA_FLOOR * memory[e, LIDAR_ACROSS]
-        seen[HEADING] = h + HEADING_ERROR * memory[e, TURN]
-        seen[LENGTH], seen[WIDTH] = length * stretch, width * stretch
-        variance = COLOURED * CAMERA_FLOOR * CAMERA_FLOOR
-        tracking.see(
-            tracks, memory, e, seen[X], seen[Y], seen[HEADING], seen[LENGTH], seen[WIDTH],
-            seen[KIND], seen[CONFIDENCE], variance, variance,
-        )  # fmt: skip
+        seen[column.SEEN_BY], seen[column.KIND] = column.GHOST, row[WHAT]
+        seen[column.CONFIDENCE] = sure
+        seen[column.X], seen[column.Y], seen[column.HEADING] = x, y, h
+        seen[column.LENGTH], seen[column.WIDTH] = length, width
+        variance = COLOURED * error * error
+        tracking.see(tracks, memory, e, x, y, h, length, width, row[WHAT], sure, variance, variance)

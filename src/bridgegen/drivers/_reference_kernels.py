@@ -20,9 +20,9 @@ from bridgegen.drivers._following_kernels import (
     COMFORT_DECELERATION,
     keep_distance,
 )
+from bridgegen.drivers._ghost_kernels import haunt
 from bridgegen.drivers._lane_change_kernels import LAST, change_lane, look_back, shift_of
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
-from bridgegen.drivers._ghost_kernels import haunt
 from bridgegen.drivers._path_kernels import UNSHIFTED, pursue_beside, shift_speed
 from bridgegen.drivers._perception_kernels import perceive
 from bridgegen.drivers._prediction_kernels import predict, predict_truly

@@ -157,24 +157,17 @@ def _weather(weather: Weather) -> dict[str, Any]:
     }
 
 
-def _phantom(ghost: Float, steps: Int, p: Playback) -> list[list[int]]:
-    """Return a ghost's detections: the frame, centre, heading, length and width, and its kind.
+def _phantom(ghost: Float, steps: Int, p: Playback) -> Any:
+    """Return a ghost's detections: the frame, and the columns of a detection from x on, scaled.
 
     The centre is that from the ego's reference point.
     """
     frames = np.flatnonzero(ghost[:, column.SEEN_BY] == column.GHOST)
-    x, y = (
-        ghost[frames, at] - here[0, steps[frames]]
-        for at, here in ((column.X, p.x), (column.Y, p.y))
-    )
-    columns = [
-        x * SCALE["length"], y * SCALE["length"], ghost[frames, column.HEADING] * SCALE["h"],
-        ghost[frames, column.LENGTH] * SCALE["length"],
-        ghost[frames, column.WIDTH] * SCALE["width"], ghost[frames, column.KIND],
-    ]  # fmt: skip
-    numbers = np.round(np.column_stack((frames, *columns))).astype(np.int64)
-    found: list[list[int]] = numbers.tolist()
-    return found
+    here = np.column_stack((p.x[0, steps[frames]], p.y[0, steps[frames]]))
+    scales = [SCALE[name] for name in ("length", "length", "h", "length", "width", "confidence")]
+    rows = ghost[frames, 1:] * [*scales, 1]
+    rows[:, :2] -= here * SCALE["length"]
+    return np.column_stack((frames, np.round(rows))).astype(np.int64).tolist()
 
 
 def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:

@@ -27,6 +27,7 @@ from bridgegen.scenario.language.reader import load as load_scenario
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.story import (
     CONDITIONS,
+    GHOST_UNITS,
     ConditionSpec,
     EventSpec,
     Ghost,
@@ -57,14 +58,9 @@ def story_lines(scenario: LogicalScenario) -> Iterator[str]:
 
 
 def _ghost(ghost: Ghost) -> str:
-    where = f"{in_words(ghost.at, 'm')} along its route" if ghost.at is not None else "at random"
-    if ghost.rate is not None:
-        where += f" ({in_words(ghost.rate, '1/m')})"
-    return (
-        f"{ghost.name}: the ego's sensors report a {ghost.type} {where}, where nothing is, from "
-        f"{in_words(ghost.appears, 'm')} to {in_words(ghost.vanishes, 'm')} ahead, for "
-        f"{in_words(ghost.lifetime, 's')} at most"
-    )
+    said = (f"{name} {in_words(value, GHOST_UNITS[name])}" for name, value in ghost.numbers.items())
+    what = f"the ego's sensors report a {ghost.type} where nothing is"
+    return f"{ghost.name}: {what} ({', '.join(said)})"
 
 
 def _participant(participant: Participant, scenario: LogicalScenario) -> str:

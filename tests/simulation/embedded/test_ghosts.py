@@ -120,7 +120,7 @@ def test_files_say_it_there_and_back(made):
     text = to_xml(concrete.storyboard)
     assert to_xml(openscenario_from_owl(found, "roads.xodr")) == text
     assert b"bridge" not in text.split(b"<Storyboard>")[1]  # no body of the scenario
-    assert [name for name in pipeline.runner.embedded.program.names] == ["ego", "rear"]
+    assert pipeline.runner.embedded.program.names == ("ego", "rear")
     approve(" ".join(story_lines(pipeline.scenario)), "bridge")
 
 

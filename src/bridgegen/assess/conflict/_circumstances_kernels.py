@@ -307,10 +307,9 @@ def unjustified(scene, begin, end):
             first -= 1
         first = max(first - int(LATELY / scene.dt), 0)
         last = min(i + int(REACTION / scene.dt), scene.n - 1)
-        reason = has_reason(scene, i)
+        reason = False
         for j in range(first, last + 1, every):
-            if not reason:
-                reason = has_reason(scene, j)
+            reason = reason or has_reason(scene, j)
         if not reason:
             return i
     return -1

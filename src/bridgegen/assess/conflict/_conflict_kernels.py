@@ -314,10 +314,6 @@ def analyse_row(
             crosswalks, friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed,
             whole[e], real[e],
         )  # fmt: skip
-    hard = False
-    for k in range(end):
-        hard |= a[0, k] <= -HARD
-    for e in range(1, n_entities if hard else 0):
         if whole[e, KIND] < NEAR_MISS:
             scene = Scene(
                 half, kinds, x, y, c, s, v, a, offset, distance, gone, claims[0], crosswalks,

@@ -372,7 +372,8 @@ def of_standing(scene, e, k, own, whole):
             if braked(scene, e, 0, since, located(since, came, early), COMFORT) == COLLIDES:
                 whole[DECIDED] = since
                 return EGO, rule_of(claim)
-    if goes_along(scene, e, k) and own in (REAR, REAR_LEFT, REAR_RIGHT):
+    ahead = scene.c[0, k] * scene.c[e, k] + scene.s[0, k] * scene.s[e, k] >= SAME_WAY
+    if ahead and own in (REAR, REAR_LEFT, REAR_RIGHT):
         who = of_braking(scene, e, k, whole)
         if who != NEITHER:
             return who, BRAKED_WITHOUT_REASON
@@ -496,37 +497,7 @@ def of_braking(scene, e, k, whole):
     whole[DECIDED], whole[TYPE] = i, UNJUSTIFIED_BRAKING
     # What a recorded ego braked for may not have been recorded.
     could = scene.friction == math.inf or braked(scene, e, 0, i, float(i), BRAKING) == CLEAR
-    return SHARED if could or tailgates(scene, e, i) else EGO
-
-
-@kernel
-def goes_along(scene, e, k):
-    """Return whether body e and the ego go the same way at instant k."""
-    return scene.c[0, k] * scene.c[e, k] + scene.s[0, k] * scene.s[e, k] >= SAME_WAY
-
-
-@kernel
-def tailgates(scene, e, k):
-    """Return whether body e, behind the ego, is too close to it at instant k."""
-    return scene.distance[e, k] < TOO_CLOSE * scene.v[e, k]
-
-
-@kernel
-def asked(scene, e, k):
-    """Return the least deceleration by which e, braking for the ego from instant k, avoids it.
-
-    In m/s²: 0 up to `COMFORT`, `BRAKING` where that does not suffice.
-    """
-    low, high = COMFORT, BRAKING
-    if braked(scene, e, 0, k, float(k), low) != COLLIDES:
-        return 0.0
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if braked(scene, e, 0, k, float(k), middle) == COLLIDES:
-            low = middle
-        else:
-            high = middle
-    return high
+    return SHARED if could or scene.distance[e, i] < TOO_CLOSE * scene.v[e, i] else EGO
 
 
 @kernel
@@ -536,34 +507,36 @@ def force(scene, e, whole, real):
     Of all such the one that asks the hardest braking of e. Of a recording, which states no
     friction, there is none: what its ego braked for may be missing.
     """
-    a, v, worst, k = scene.a, scene.v, 0.0, 0
-    while k < scene.at and scene.friction < math.inf:
-        begin = k
-        while k < scene.at and a[0, k] <= -HARD:
-            k += 1
-        if k == begin:
-            k += 1
+    c, s, v, gap, worst, end = scene.c, scene.s, scene.v, scene.distance[e], 0.0, 0
+    for k in range(scene.at if scene.friction < math.inf else 0):
+        if k < end or scene.a[0, k] > -HARD:
             continue
-        along, aside = strip(scene, e, 0, begin)
-        behind = along > 0.0 and aside == 0.0 and goes_along(scene, e, begin)
-        if not (behind and scene.distance[e, begin] < HORIZON * v[e, begin]):
+        end = k + 1
+        while end < scene.at and scene.a[0, end] <= -HARD:
+            end += 1
+        along, aside = strip(scene, e, 0, k)
+        behind = along > 0.0 and aside == 0.0 and gap[k] < HORIZON * v[e, k]
+        if not behind or c[0, k] * c[e, k] + s[0, k] * s[e, k] < SAME_WAY:
             continue
-        needed = asked(scene, e, begin)
-        if needed <= worst or unjustified(scene, begin, k) < 0:
+        low, needed = COMFORT, BRAKING
+        if braked(scene, e, 0, k, float(k), low) != COLLIDES:
             continue
-        worst, at, slowest = needed, begin, v[0, begin]
-        for i in range(begin, min(k + int(JUST_NOW / scene.dt), scene.at)):
-            slowest = min(slowest, v[0, i])
-            if scene.distance[e, i] < scene.distance[e, at]:
-                at = i
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + needed)
+            if braked(scene, e, 0, k, float(k), middle) == COLLIDES:
+                low = middle
+            else:
+                needed = middle
+        if needed <= worst or unjustified(scene, k, end) < 0:
+            continue
+        worst = needed
         whole[KIND], whole[TYPE] = VIOLATION, UNJUSTIFIED_BRAKING
-        whole[RULE] = BRAKED_WITHOUT_REASON
-        whole[RESPONSIBLE] = SHARED if tailgates(scene, e, begin) else EGO
-        whole[INSTANT], whole[DECIDED] = at, begin
+        whole[RESPONSIBLE] = SHARED if gap[k] < TOO_CLOSE * v[e, k] else EGO
+        whole[RULE], whole[DECIDED], whole[INSTANT] = BRAKED_WITHOUT_REASON, k, end
         whole[ZONE_EGO], whole[ZONE_OTHER] = REAR, FRONT
         real[TTC], real[NEEDED], real[ALONG] = math.inf, needed, 0.0
-        real[ACROSS] = max(v[e, begin] - slowest, 0.0)  # as if it had not braked
-        real[V_EGO], real[V_OTHER] = v[0, begin], v[e, begin]
+        real[ACROSS] = max(v[e, k] - v[0, end], 0.0)  # as if it had not braked
+        real[V_EGO], real[V_OTHER] = v[0, k], v[e, k]
 
 
 @kernel

@@ -65,8 +65,8 @@ function unpackSensed(packed, n) {
       };
     });
   });
-  const phantoms = packed.phantoms.flat().map(([frame, dx, dy, h, length, width, kind]) => (
-    { frame, dx: dx / scale.length, dy: dy / scale.length, h: h / scale.h, length: length / scale.length, width: width / scale.width, kind: packed.kinds[kind] }
+  const phantoms = packed.phantoms.flat().map(([frame, dx, dy, h, length, width, confidence, kind]) => (
+    { frame, dx: dx / scale.length, dy: dy / scale.length, h: h / scale.h, length: length / scale.length, width: width / scale.width, confidence: confidence / scale.confidence, kind: packed.kinds[kind] }
   ));
   return { steps, frame: holding(steps, n), entities, phantoms, tolerance: packed.tolerance };
 }

@@ -388,6 +388,10 @@ class RoadWorks:
     sign: Waypoint
 
 
+GHOST_UNITS = {"at": "m", "rate": "1/m", "appears": "m", "vanishes": "m", "lifetime": "s"}
+"""The numbers of a ghost, with their units; see ``GhostSection``."""
+
+
 @dataclass(frozen=True)
 class Ghost:
     """What the ego's sensors report and is not there.
@@ -395,31 +399,12 @@ class Ghost:
     Attributes:
         name: of it.
         type: what it is taken for, one of `bridgegen.scenario.participants.TYPES`.
-        at: where its near end stands along the ego's route, from the ego's start [m]; None: it is
-            born at random, by the rate.
-        rate: births per distance that the ego travels [1/m]; None: it stands at its place.
-        appears: distance ahead of the ego's front below which it is reported [m].
-        vanishes: distance ahead of the ego's front below which it is not any more [m].
-        lifetime: how long it is reported at most [s]; of one that is born at random the mean.
+        numbers: those of `GHOST_UNITS` that it has, by name: either at or rate.
     """
 
     name: str
     type: str
-    at: Quantity | None
-    rate: Quantity | None
-    appears: Quantity
-    vanishes: Quantity
-    lifetime: Quantity
-
-    @property
-    def quantities(self) -> dict[str, Quantity]:
-        """Its numbers, by name."""
-        found = {name: getattr(self, name) for name in GHOST_UNITS}
-        return {name: value for name, value in found.items() if value is not None}
-
-
-GHOST_UNITS = {"at": "m", "rate": "1/m", "appears": "m", "vanishes": "m", "lifetime": "s"}
-"""The numbers of a ghost, with their units."""
+    numbers: Mapping[str, Quantity]
 
 
 @dataclass(frozen=True)

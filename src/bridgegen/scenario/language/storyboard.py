@@ -257,18 +257,14 @@ class Storyboard:
                 self._report(f"a ghost's name is a word, got '{name}'", path)
             if (given.at is None) == (given.rate is None):
                 self._report(f"ghost {name} must have a place (at) or a rate, one of the two", path)
-            values = {name: getattr(given, name) for name in GHOST_UNITS}
-            for word, unit in GHOST_UNITS.items():
-                if values[word] is not None:
-                    above = word in ("rate", "appears", "lifetime")
-                    self._check(values[word], unit, (*path, word), above=above)
+            numbers = {w: value for w in GHOST_UNITS if (value := getattr(given, w)) is not None}
+            for word, value in numbers.items():
+                above = word in ("rate", "appears", "lifetime")
+                self._check(value, GHOST_UNITS[word], (*path, word), above=above)
             near, far = given.vanishes, given.appears
             if not isinstance(near, str) and not isinstance(far, str) and near >= far:
-                self._report(
-                    f"vanishes < appears [m] must hold for ghost {name}, got {near:g} and {far:g}",
-                    path,
-                )
-            yield Ghost(name, given.type, **values)
+                self._report(f"vanishes < appears [m] must hold, got {near:g} and {far:g}", path)
+            yield Ghost(name, given.type, numbers)
 
     def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check model and own body, if there are: what the type's has none of, it has not."""

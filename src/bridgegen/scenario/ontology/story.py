@@ -125,7 +125,7 @@ def add_ghosts(builder: Builder, ghosts: Iterable[Ghost]) -> None:
         node = builder.node(ghost.name, "Ghost")
         builder.put(node, "has_name", ghost.name)
         builder.put(node, "has_ghost_type", ghost.type)
-        for name, value in ghost.quantities.items():
+        for name, value in ghost.numbers.items():
             builder.quantity(node, f"has_ghost_{name}", value)
         builder.put(builder.iri(f"{EGO}_controller"), "has_ghost", node)
 

@@ -237,8 +237,7 @@ def _add_controller(
         builder.put(controller, "has_ideal_stages", builder.text(ideal))
     ghosts: dict[str, ox.NamedNode] = {}
     for said in item.properties.properties if item.properties else ():
-        prefix, _, rest = builder.text(said.name).partition(".")
-        ghost, _, word = rest.partition(".")
+        prefix, ghost, word = (*builder.text(said.name).split(".", 2), "", "")[:3]
         if prefix != GHOST or word not in ("type", *GHOST_UNITS):
             continue
         if ghost not in ghosts:
@@ -247,11 +246,9 @@ def _add_controller(
             builder.put(controller, "has_ghost", ghosts[ghost])
         if word == "type":
             builder.put(ghosts[ghost], "has_ghost_type", builder.text(said.value))
-            continue
-        number = said.value
-        if not isinstance(number, osc.ParameterRef):
-            as_number(builder, number, said)
-        builder.number(ghosts[ghost], f"has_ghost_{word}", number, said)
+        else:
+            as_number(builder, said.value, said)
+            builder.number(ghosts[ghost], f"has_ghost_{word}", said.value, said)
     builder.put(node, "has_controller", controller)
 
 

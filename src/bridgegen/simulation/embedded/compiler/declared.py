@@ -207,32 +207,30 @@ def ghosts(controllers: Controllers, tables: Tables) -> Int:
     rows = []
     for name, words in said.items():
         where = f"{tables.place}, line {next(iter(words.values())).line}: {GHOST}.{name}"
-        wrong = [word for word in words if word not in ("type", *GHOST_UNITS)]
-        if wrong or not {"type", "appears"} <= words.keys() or ("at" in words) == ("rate" in words):
+        has = words.keys()
+        if not (
+            {"type", "appears"} <= has <= {"type", *GHOST_UNITS} and ("at" in has) ^ ("rate" in has)
+        ):
             raise InputError(
                 f"{where} must have type, appears, and at or rate; may have vanishes and lifetime; "
                 f"got {', '.join(words)}"
             )
-        kind = PARTICIPANTS.get(tables.text(words["type"].value))
-        if kind is None:
-            raise InputError(
-                f"{where}.type must be one of {', '.join(PARTICIPANTS)}, got "
-                f"'{words['type'].value}'"
-            )
+        said_type = tables.text(words["type"].value)
+        if said_type not in PARTICIPANTS:
+            known = ", ".join(PARTICIPANTS)
+            raise InputError(f"{where}.type must be one of {known}, got '{said_type}'")
         slots = {"vanishes": tables.slot(0.0), "lifetime": tables.slot(60.0)}
-        for word in GHOST_UNITS:
-            if word not in words:
-                continue
+        for word in (word for word in GHOST_UNITS if word in words):
             text = words[word].value
-            known = isinstance(text, osc.ParameterRef) and text.name in tables.parameters
-            value: Value | None = text if known else _number(tables.text(text))
-            now = math.nan if value is None else tables.declared(value)
-            if value is None or not 0.0 <= now < math.inf:
+            varies = isinstance(text, osc.ParameterRef) and text.name in tables.parameters
+            value: Value | None = text if varies else _number(tables.text(text))
+            if value is None or not 0.0 <= tables.declared(value) < math.inf:
                 raise InputError(
                     f"{where}.{word} [{GHOST_UNITS[word]}] must be a finite number of at least 0, "
                     f"got '{text}'"
                 )
             slots[word] = tables.slot(value)
+        kind = PARTICIPANTS[said_type]
         size = tables.slot(kind.body.length), tables.slot(kind.body.width)
         what = NAMES.index(kind.seen_as.name)
         rows.append((*(slots.get(word, -1) for word in GHOST_UNITS), *size, what))
