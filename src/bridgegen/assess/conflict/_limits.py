@@ -143,8 +143,8 @@ HARD = 5.0
 """Deceleration from which on braking needs a reason [m/s²]. Source: UN R157, 5.3.1: more than 5
 m/s² is an emergency manoeuvre; UN R152: an emergency braking system demands 5 m/s² at least."""
 TOO_CLOSE = 0.9
-"""Time gap below which a follower is too close [s]: a quarter of the speedometer's km/h in metres.
-Source: BKatV, annex, table 2: a distance below half of half the speedometer is fined."""
+"""Time gap below which a follower is too close [s]. Source: BKatV, annex, 12.5 to 12.7, above 80
+km/h: fined below half of half the speedometer, a quarter of the km/h in metres."""
 JUST_NOW = 3.0
 """Time before a contact within which a body's actions count [s]. Ours: lane changes take 3 to 6
 s."""
