@@ -19,6 +19,11 @@ export function detectionWords(found) {
   return found.kind ? `${off}, as ${found.kind}` : off;
 }
 
+/** What the sensors report where nothing is. */
+export function phantomWords(kept, index) {
+  return phantomsAt(kept, index).map(({ dx, dy }) => `ghost ${Math.hypot(dx, dy).toFixed(0)}\u00a0m`);
+}
+
 function intentionWords(kept, state) {
   const meant = intentionAt(kept, state);
   if (!meant || meant.planned === null) return "";
@@ -44,7 +49,7 @@ export function stateWords(kept, state) {
     const told = [...lampWords(showsAt(kept.entities[e], state.index)), detectionWords(detectionAt(kept, e, state.index))].filter(Boolean);
     parts.push([`${s.name} ${value(s.v, "m/s", 1)}`, ...told].join(", "));
   }
-  for (const { kind, dx, dy } of phantomsAt(kept, state.index)) parts.push(`sensors report a ${kind} ${Math.hypot(dx, dy).toFixed(0)} m away, where nothing is`);
+  parts.push(...phantomWords(kept, state.index).map((words) => `sensors report a ${words} away, where nothing is`));
   state.entities.forEach((s, e) => {
     const off = elsewhereWords(kept, state, e);
     if (off) parts.push(`${s.name} ${off}`);
