@@ -60,7 +60,7 @@ def story_lines(scenario: LogicalScenario) -> Iterator[str]:
 def _ghost(ghost: Ghost) -> str:
     said = (f"{name} {in_words(value, GHOST_UNITS[name])}" for name, value in ghost.numbers.items())
     what = f"the ego's sensors report a {ghost.type} where nothing is"
-    return f"{ghost.name}: {what} ({', '.join(said)})"
+    return f"{ghost.name}: {what} ({', '.join(said)})."
 
 
 def _participant(participant: Participant, scenario: LogicalScenario) -> str:
