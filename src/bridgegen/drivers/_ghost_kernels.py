@@ -40,8 +40,7 @@ BIRTHS = 3  # a stream of random numbers, after those of `_sensor_kernels`
 def is_reported(frame, moved, row, slots, front, key, e, memory):
     """Return whether a ghost is reported in a frame; bear it, or let it go.
 
-    ``moved`` [m] is how far the ego has come since the frame before, ``front`` the station [m] of
-    its front.
+    ``moved`` [m] is the ego's way since the frame before, ``front`` the station of its front [m].
     """
     now = frame * physics.FRAME
     nearest, farthest = slots[row[VANISHES]], slots[row[APPEARS]]

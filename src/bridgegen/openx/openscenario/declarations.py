@@ -68,8 +68,7 @@ it follows from the values of the file's parameters."""
 
 
 GHOST = "ghost"
-"""Property of a controller, ``ghost.NAME.KEY``: what its sensors report and is not there, by the
-keys of `bridgegen.scenario.language.story.Ghost`."""
+"""Property of a controller, ``ghost.NAME.KEY``: what its sensors report and is not there."""
 
 
 @dataclass(frozen=True)

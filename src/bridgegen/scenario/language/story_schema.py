@@ -268,8 +268,7 @@ class GhostSection(ShapedSection):
     type: Annotated[TypeName, AfterValidator(canonical)] = "car"
     """Type of participant that it is taken for."""
     at: Length | None = None
-    """Place along the ego's route at which it seems to stand, from the ego's start [m]: a bridge,
-    a gantry, a manhole cover."""
+    """Place along the ego's route at which it seems to stand, from the ego's start [m]."""
     rate: Curvature | None = None
     """Births per distance travelled instead of a place [1/m], at random in the region ahead."""
     appears: Length

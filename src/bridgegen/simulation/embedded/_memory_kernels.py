@@ -245,8 +245,7 @@ class State(NamedTuple):
             ``_chassis_columns`` and ``_multi_body_columns``.
         key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.drivers.noise`.
         sensors: ``(E + G, MEMORY)``, between two frames; see ``ego._perception_kernels``.
-        tracks: ``(E + G, TRACK)`` what the ego perceives, the ghosts last; see
-            ``ego._tracking_kernels``.
+        tracks: ``(E + G, TRACK)`` what it perceives, ghosts last; see ``ego._tracking_kernels``.
         around: ``(E + G, AROUND)`` the same from its route; see ``ego._surroundings_kernels``.
         passages: ``(·, PASSAGE)`` what it predicts; see ``ego._prediction_kernels``.
         feet: ``(W,)`` [m], stations of the tracks on the ways that they may be on.
