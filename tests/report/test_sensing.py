@@ -71,7 +71,7 @@ def test_a_ghost_is_drawn_where_the_sensors_report_it_and_only_then():
     logical = load("phantom-braking")
     pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="reference"))
     played = nominal_playback(pipeline, "phantom-braking")
-    packed = playback_payload(played)["sensed"]
+    packed = playback_payload(played, 0, 0)["sensed"]
     ghosts = pipeline.rollout(logical.space().row({})[np.newaxis]).ghosts[0, 0]
     steps = np.flatnonzero(ghosts[:, SEEN_BY] == GHOST)
     (told,) = packed["phantoms"]
