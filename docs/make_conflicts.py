@@ -49,6 +49,7 @@ PICTURES: dict[ConflictType, tuple[Body, Body]] = {
     ConflictType.LANE_DEPARTURE: (Body(88, 56, 18, 40), line(58)),
     ConflictType.ROAD_DEPARTURE: (Body(88, 62, -18, 40), line(66)),
     ConflictType.CLOSE_PASS: (Body(84, 50, 0, 44), Body(96, 70, 0, 26, 24, 8)),
+    ConflictType.UNJUSTIFIED_BRAKING: (Body(112, 56, 0, 10), Body(48, 56, 0, 18)),
 }
 
 

@@ -387,7 +387,7 @@ def test_braking_hard_without_a_reason_is_shared(track, meeting, course):
     assert verdict(meeting(ego, behind)) == (SHARED, Rule.BRAKED_WITHOUT_REASON)
     reason = track(x=48.0)
     assert verdict(meeting(ego, behind, reason)) == (BV, Rule.REAR_DISTANCE)
-    gently = track(v=course((0.0, 20.0), (1.0, 20.0), (5.0, 0.0), (6.0, 0.0)))
+    gently = track(v=course((0.0, 20.0), (1.0, 20.0), (6.0, 0.0)))
     assert verdict(meeting(gently, behind)) == (BV, Rule.REAR_DISTANCE)
 
 

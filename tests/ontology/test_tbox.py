@@ -204,7 +204,7 @@ NO_LAYER = {
     *("ScenarioElement", "Scenario", "Parameter", "DerivedParameter", "LocatedElement", "Static"),
     *("Event", "StoryboardEvent", "Trigger", "Condition", "ConditionGroup", "Action"),
     *("Position", "LanePosition", "WorldPosition", "Route", "Trajectory", "Vertex", "Controller"),
-    *("Act", "Variable", "OpenScenarioPosition", "MinedScenario", "Statistic"),
+    *("Ghost", "Act", "Variable", "OpenScenarioPosition", "MinedScenario", "Statistic"),
 }
 TOP_OF_LAYER = {
     1: ("RoadNetwork", "AreaEntities", "GeometrySegment", "JunctionConnection", "LaneLink"),

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from bridgegen.assess.metrics.perception import e_position, perceived
-from bridgegen.drivers.kinds import DETECTION
+from bridgegen.drivers.kinds import DETECTION, GHOST, SEEN_BY, X, Y
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.playback_payload import playback_payload
+from bridgegen.pages.playbacks import nominal_playback
 from bridgegen.pages.sensing import TOLERANCE, sensed
 from bridgegen.scenario.language.reader import load
 
@@ -62,3 +64,20 @@ def test_without_sensors_there_is_nothing():
     rollout = pipeline.rollout(pipeline.space.row({})[np.newaxis])
     assert rollout.detections.shape[-1] == DETECTION
     assert sensed(rollout) == []
+
+
+def test_a_ghost_is_drawn_where_the_sensors_report_it_and_only_then():
+    """The page's whole numbers, read again: within a centimetre of the detections."""
+    logical = load("phantom-braking")
+    pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="reference"))
+    played = nominal_playback(pipeline, "phantom-braking")
+    packed = playback_payload(played, 0, 0)["sensed"]
+    ghosts = pipeline.rollout(logical.space().row({})[np.newaxis]).ghosts[0, 0]
+    steps = np.flatnonzero(ghosts[:, SEEN_BY] == GHOST)
+    (told,) = packed["phantoms"]
+    assert len(told) == len(steps) > 5
+    at = np.cumsum(packed["steps"])[[row[0] for row in told]]
+    assert at.tolist() == steps.tolist()
+    there = np.array(told)[:, 1:3] / 100 + np.column_stack((played.x[0, at], played.y[0, at]))
+    assert there == pytest.approx(ghosts[steps][:, [X, Y]], abs=0.01)
+    assert {packed["kinds"][row[-1]] for row in told} == {"car"}

@@ -103,6 +103,7 @@ def rows_of(pipeline, n, seed):
         ("crossroads-s4", "route-follower"),
         ("crossroads-s2", "reference"),  # perceives, with noise
         ("cut-in", "un-r157"),  # others are attentive and change lanes
+        ("ghost-in-town", "reference"),  # reports what is not there
         ("emergency-vehicle-on-red", "careful"),  # lights, sirens
         ("stopped-after-curve", "route-follower"),  # starts on spirals, beside the road's line
     ],

@@ -137,8 +137,8 @@ def predict(path, n, ds, s, ahead, own_width, tracks, around, known, ways, count
         # Every way that the map offers is a hypothesis, as long as the track is on it. To predict
         # at constant velocity made the ego stop inside the path of a turning car: collisions in 25
         # % of the random rows of crossroads-s3, with ways 1.6 %.
-        on_way = False
-        for j in range(first[e], first[e + 1] if known else first[e]):
+        on_way, mapped = False, known and e + 1 < len(first)  # no map has ways of ghosts
+        for j in range(first[e] if mapped else 0, first[e + 1] if mapped else 0):
             if feet[j] < LOST:
                 feet[j] += 1.0
                 continue
@@ -174,8 +174,8 @@ def predict_truly(path, n, ds, s, ahead, own_width, tracks, around, paths, count
     for e in range(1, tracks.shape[0]):
         if tracks[e, STATE] < CONFIRMED:
             continue
-        gain = around[e, QUICKENING]
-        for turn in range(2):
+        gain, is_ghost = around[e, QUICKENING], e >= len(on)
+        for turn in range(0 if is_ghost else 2):
             j, near = (on[e], station[e]) if turn == 0 else (to[e], foot[e])
             if j < 0 or zones[j, 0] == math.inf:
                 continue
@@ -185,7 +185,7 @@ def predict_truly(path, n, ds, s, ahead, own_width, tracks, around, paths, count
             w = elementary.hypot(tracks[e, VX], tracks[e, VY])
             half, rank = 0.5 * tracks[e, LENGTH], ranks[j] if j < len(ranks) else 0
             count = add_passage(passages, count, zones[j], q, w, half, e, gain, rank)
-        if IS_VULNERABLE[int(tracks[e, KIND])]:
+        if is_ghost or IS_VULNERABLE[int(tracks[e, KIND])]:
             count = add_straight(
                 path, n, ds, s, ahead, own_width, tracks[e], e, gain, passages, count
             )

@@ -20,6 +20,7 @@ from bridgegen.drivers._following_kernels import (
     COMFORT_DECELERATION,
     keep_distance,
 )
+from bridgegen.drivers._ghost_kernels import haunt
 from bridgegen.drivers._lane_change_kernels import LAST, change_lane, look_back, shift_of
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.drivers._path_kernels import UNSHIFTED, pursue_beside, shift_speed
@@ -153,6 +154,7 @@ def drive(k, plan_, roads, state, record):
         record.h, record.v, plan_.bodies, plan_.kinds, state.lamps, state.weather, state.sensors,
         state.tracks, record.detections,
     )  # fmt: skip
+    haunt(k, plan_, roads, state, record)
     # By time, not by instants: so it plans as often at any step up to `CYCLE`.
     if k * plan_.dt > mind[NEXT_PLAN] - 1e-6:
         mind[NEXT_PLAN] += max(CYCLE, plan_.dt)

@@ -55,9 +55,9 @@ KIND = 7
 DETECTION = 8
 """Number of columns of a detection."""
 
-NO_FRAME, MISSED, CAMERA, LIDAR, BOTH = -1, 0, 1, 2, 3
+NO_FRAME, MISSED, CAMERA, LIDAR, BOTH, GHOST = -1, 0, 1, 2, 3, 4
 """Codes of `SEEN_BY`: no sensor took a frame at this instant; a frame missed the entity; the
-sensors that saw it."""
+sensors that saw it; a false positive, where nothing is."""
 
 
 # --- Properties of each kind for compiled code, by its code in `bridgegen.drivers.kinds` ---

@@ -4,7 +4,7 @@ All in SI units; NaN or an infinity stands where a quantity does not exist.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf, isfinite
 
 import numpy as np
@@ -128,6 +128,7 @@ class Sensed:
         kinds: the words for it.
         kind_of: ``(E,)`` int64, what each is, likewise.
         tolerance: a detection whose centre is farther off than this is displaced [m].
+        ghosts: ``(G, F, 8)`` float64, false positives, where nothing is; see `Rollout.ghosts`.
     """
 
     steps: Int
@@ -143,6 +144,7 @@ class Sensed:
     kinds: tuple[str, ...]
     kind_of: Int
     tolerance: float
+    ghosts: Float = field(default_factory=lambda: np.zeros((0, 0, 8)))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.assess.metrics.distances import first_closest
-from bridgegen.base.arrays import Float
+from bridgegen.base.arrays import Float, Int
+from bridgegen.drivers import kinds as column
 from bridgegen.pages.findings_payload import conflict_payload
 from bridgegen.pages.playback import Beside, Course, Lamp, Planned, Playback, Sensed, Weather
 from bridgegen.pages.series import packed
@@ -156,6 +157,19 @@ def _weather(weather: Weather) -> dict[str, Any]:
     }
 
 
+def _phantom(ghost: Float, steps: Int, p: Playback) -> Any:
+    """Return a ghost's detections: the frame, and the columns of a detection from x on, scaled.
+
+    The centre is that from the ego's reference point.
+    """
+    frames = np.flatnonzero(ghost[:, column.SEEN_BY] == column.GHOST)
+    here = np.column_stack((p.x[0, steps[frames]], p.y[0, steps[frames]]))
+    scales = [SCALE[name] for name in ("length", "length", "h", "length", "width", "confidence")]
+    rows = ghost[frames, 1:] * [*scales, 1]
+    rows[:, :2] -= here * SCALE["length"]
+    return np.column_stack((frames, np.round(rows))).astype(np.int64).tolist()
+
+
 def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:
     """Return detections: a letter per entity and frame, and six numbers of each detection.
 
@@ -198,6 +212,7 @@ def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:
     return {
         "steps": np.diff(steps, prepend=0).tolist(),
         "entities": entities,
+        "phantoms": [_phantom(ghost[kept], steps, p) for ghost in s.ghosts],
         "kinds": list(s.kinds),
         "tolerance": s.tolerance,
     }

@@ -27,8 +27,10 @@ from bridgegen.scenario.language.reader import load as load_scenario
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.story import (
     CONDITIONS,
+    GHOST_UNITS,
     ConditionSpec,
     EventSpec,
+    Ghost,
     Jam,
     Participant,
     RoadWorks,
@@ -51,7 +53,14 @@ def story_lines(scenario: LogicalScenario) -> Iterator[str]:
             yield _participant(participant, scenario)
     yield from (_jam(jam, scenario) for jam in scenario.story.jams)
     yield from (_works(works) for works in scenario.story.works)
+    yield from (_ghost(ghost) for ghost in scenario.story.ghosts)
     yield from (_event(event) for event in scenario.events)
+
+
+def _ghost(ghost: Ghost) -> str:
+    said = (f"{name} {in_words(value, GHOST_UNITS[name])}" for name, value in ghost.numbers.items())
+    what = f"the ego's sensors report a {ghost.type} where nothing is"
+    return f"{ghost.name}: {what} ({', '.join(said)})."
 
 
 def _participant(participant: Participant, scenario: LogicalScenario) -> str:

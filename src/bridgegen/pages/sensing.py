@@ -52,6 +52,9 @@ def sensed(rollout: Rollout) -> list[Sensed]:
                 kinds=NAMES,
                 kind_of=rollout.kinds,
                 tolerance=TOLERANCE,
+                ghosts=rollout.ghosts[row, :, steps].swapaxes(0, 1)
+                if rollout.ghosts.size
+                else np.zeros((0, len(steps), column.DETECTION)),
             )
         )
     return found

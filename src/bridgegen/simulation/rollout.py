@@ -96,6 +96,8 @@ class Rollout:
         detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
             instant, in the columns of `bridgegen.drivers.kinds`; rows of the ego itself
             are zeros. ``(0, 0, 0, 8)`` where its driver perceives nothing.
+        ghosts: ``(N, G, T, 8)`` float64, likewise its false positives, where nothing is;
+            ``(0, 0, 0, 8)`` where a scenario states none.
         stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where a route
             crosses the stop line of a traffic light, the heading in travel direction.
         stop_lights: ``(L,)`` int64, each stop line's light, an index into ``light_names``.
@@ -141,6 +143,7 @@ class Rollout:
     lamps: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0, 0), np.int8))
     kinds: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     detections: Float = field(default_factory=lambda: np.zeros((0, 0, 0, 8)))
+    ghosts: Float = field(default_factory=lambda: np.zeros((0, 0, 0, 8)))
     stop_lines: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))
     stop_lights: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     stop_entities: Int = field(default_factory=lambda: np.zeros(0, np.int64))
@@ -224,11 +227,13 @@ class Rollout:
 
 _BY_ROW = (
     "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",
-    "stop_lines", "present", "lamps", "claims", "crosswalks", "friction", "progress",
+    "ghosts", "stop_lines", "present", "lamps", "claims", "crosswalks", "friction", "progress",
     "corridor_of",
 )  # fmt: skip
 
-_BY_INSTANT = ("x", "y", "h", "v", "a", "offset", "lights", "present", "lamps", "detections")
+_BY_INSTANT = (
+    "x", "y", "h", "v", "a", "offset", "lights", "present", "lamps", "detections", "ghosts",
+)  # fmt: skip
 
 
 def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:

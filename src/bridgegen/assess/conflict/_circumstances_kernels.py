@@ -5,14 +5,16 @@
 
 import math
 
+from bridgegen.assess.conflict._careful_driver_kernels import bend_at
 from bridgegen.assess.conflict._geometry_kernels import pose_before, turned
 from bridgegen.assess.conflict._limits import (
     AHEAD,
-    AHEAD_TIME,
     ALIKE,
     ASIDE,
     CROSSWALK_MARGIN,
+    EVIDENT_EVERY,
     HALVINGS,
+    HARD,
     HORIZON,
     JUNCTION,
     JUST_NOW,
@@ -20,6 +22,8 @@ from bridgegen.assess.conflict._limits import (
     LATELY,
     LINE_REACH,
     LOOKED_BACK,
+    MARGIN,
+    MARGIN_ON_FOOT,
     REACTION,
     SAME_WAY,
     SIGHT,
@@ -28,6 +32,7 @@ from bridgegen.assess.conflict._limits import (
 )
 from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
+from bridgegen.drivers.kinds import BRAKE_LIGHTS_FROM, IS_VULNERABLE
 
 RED, RED_AND_YELLOW = 1, 2
 """States of a light, as ``Rollout.lights`` has them."""
@@ -243,14 +248,79 @@ def same_road(scene, e, k):
 
 
 @kernel
+def strip(scene, a, b, k):
+    """Return how far ahead of body a another one is at instant k, and how far aside of its strip.
+
+    Both in metres; aside is 0 within the strip that a sweeps, straight on or in the bend that it
+    drives. A vehicle that stands or drives askew may be where the road bends: on an arc to its
+    place and heading.
+    """
+    c, s = scene.c, scene.s
+    dx, dy = scene.x[b, k] - scene.x[a, k], scene.y[b, k] - scene.y[a, k]
+    along, aside = dx * c[a, k] + dy * s[a, k], dy * c[a, k] - dx * s[a, k]
+    cosine = c[a, k] * c[b, k] + s[a, k] * s[b, k]
+    sine = c[a, k] * s[b, k] - s[a, k] * c[b, k]
+    room = scene.half[a, 1] + scene.half[b, 0] * abs(sine) + scene.half[b, 1] * abs(cosine)
+    room += MARGIN_ON_FOOT if IS_VULNERABLE[scene.kinds[b]] else MARGIN
+    least = min(abs(aside), abs(aside - 0.5 * bend_at(scene, a, k) * along * along))
+    if abs(cosine) > SAME_WAY and aside * sine * cosine > 0.0:
+        least = min(least, max(abs(aside) - abs(along * sine / cosine), 0.0))
+    return along, max(least - room, 0.0)
+
+
+@kernel
+def asks(scene, o, k):
+    """Return whether body o asks the ego to brake hard at instant k.
+
+    It is ahead in the ego's way, or on its way there within `HORIZON`, and nearer than the ego
+    comes to a stop by `HARD`, or to the speed of one that does not brake.
+    """
+    v, c, s = scene.v, scene.c, scene.s
+    along, aside = strip(scene, 0, o, k)
+    if along <= 0.0:
+        return False
+    its = max(v[o, k] * (c[0, k] * c[o, k] + s[0, k] * s[o, k]), 0.0)
+    if scene.a[o, k] <= -BRAKE_LIGHTS_FROM:
+        its = 0.0
+    stops = v[0, k] * REACTION + max(v[0, k] * v[0, k] - its * its, 0.0) / (2.0 * HARD)
+    if not scene.distance[o, k] <= stops + AHEAD:
+        return False
+    left = (scene.y[o, k] - scene.y[0, k]) * c[0, k] - (scene.x[o, k] - scene.x[0, k]) * s[0, k]
+    across = v[o, k] * (c[0, k] * s[o, k] - s[0, k] * c[o, k])
+    nears = -across if left > 0.0 else across
+    return aside <= max(nears, 0.0) * HORIZON
+
+
+@kernel
+def unjustified(scene, begin, end):
+    """Return the first of the instants at which the ego brakes hard without a reason; -1: none.
+
+    A reason counts from `LATELY` before the braking began, `HORIZON` before at most, to `REACTION`
+    after: harder braking than it asks for ends the need for it, and one may brake for what comes.
+    """
+    every = max(int(EVIDENT_EVERY / scene.dt + 0.5), 1)
+    for i in range(max(begin, 0), end):
+        if scene.a[0, i] > -HARD or scene.v[0, i] <= STANDS:
+            continue
+        first, earliest = i, max(i - int(HORIZON / scene.dt), 0)
+        while first > earliest and scene.a[0, first - 1] <= -BRAKE_LIGHTS_FROM:
+            first -= 1
+        first = max(first - int(LATELY / scene.dt), 0)
+        last = min(i + int(REACTION / scene.dt), scene.n - 1)
+        reason = False
+        for j in range(first, last + 1, every):
+            reason = reason or has_reason(scene, j)
+        if not reason:
+            return i
+    return -1
+
+
+@kernel
 def has_reason(scene, k):
     """Return whether the ego has a reason to brake hard at instant k: an actor ahead or a light."""
     x, y, c, s = scene.x, scene.y, scene.c, scene.s
-    reach = AHEAD_TIME * scene.v[0, k] + AHEAD
     for o in range(1, x.shape[0]):
-        if not scene.distance[o, k] < reach:
-            continue
-        if (x[o, k] - x[0, k]) * c[0, k] + (y[o, k] - y[0, k]) * s[0, k] > 0.0:
+        if asks(scene, o, k):
             return True
     for j in range(len(scene.stop_entities)):
         if scene.stop_entities[j] != 0 or not math.isfinite(scene.stop_lines[j, 0]):

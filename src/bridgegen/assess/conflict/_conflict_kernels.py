@@ -49,6 +49,7 @@ from bridgegen.assess.conflict._codes import (
     TYPE,
     V_EGO,
     V_OTHER,
+    VIOLATION,
     VRU_INTO_SIDE,
     WRONG_SIDE,
     ZONE_EGO,
@@ -76,6 +77,7 @@ from bridgegen.assess.conflict._limits import (
     FRONT_PART,
     GUIDANCE,
     GUIDANCE_STEP,
+    HARD,
     HORIZON,
     MOVES,
     NEAR,
@@ -84,7 +86,7 @@ from bridgegen.assess.conflict._limits import (
     SOON,
     STANDS,
 )
-from bridgegen.assess.conflict._responsibility_kernels import judge
+from bridgegen.assess.conflict._responsibility_kernels import force, judge
 from bridgegen.assess.conflict._severity_kernels import collision
 from bridgegen.assess.conflict._type_kernels import type_of
 from bridgegen.assess.metrics._time_kernels import STANDSTILL, time_to_contact
@@ -321,6 +323,13 @@ def analyse_row(
             crosswalks, friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed,
             whole[e], real[e],
         )  # fmt: skip
+        if whole[e, KIND] < NEAR_MISS:
+            scene = Scene(
+                half, kinds, x, y, c, s, v, a, offset, distance, gone, claims[0], crosswalks,
+                friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed, 0, n, dt,
+                n - 1, min(end, n - 1), False,
+            )  # fmt: skip
+            force(scene, e, whole[e], real[e])
 
 
 @kernel
@@ -364,10 +373,10 @@ def never_moves(v):
 
 
 @kernel
-def weigh(kinds, v, whole, real, potential, severity, changes):
-    """Fill the severity of a row's contacts and near misses.
+def weigh(kinds, v, whole, real, potential, severity, changes, breach):
+    """Fill the severity of a row's contacts, near misses and unjustified braking.
 
-    ``potential`` and ``severity`` are ``(E,)``, ``changes`` of velocity ``(E, 2)``.
+    ``potential``, ``severity`` and ``breach`` are ``(E,)``, ``changes`` of velocity ``(E, 2)``.
     """
     for e in range(1, len(kinds)):
         if whole[e, KIND] < NEAR_MISS:
@@ -377,6 +386,8 @@ def weigh(kinds, v, whole, real, potential, severity, changes):
             kinds[0], kinds[e], real[e, ACROSS], real[e, ALONG], STRUCK[whole[e, ZONE_EGO]],
             STRUCK[whole[e, ZONE_OTHER]], True, not (IS_OBSTACLE[kinds[e]] and never_moves(v[e])),
         )  # fmt: skip
+        if whole[e, KIND] == VIOLATION:
+            breach[e] = min((real[e, NEEDED] - COMFORT) / (HARD - COMFORT), 1.0)
         if whole[e, KIND] == CONTACT:
             severity[e], changes[e, 0], changes[e, 1] = potential[e], mine, its
 
@@ -385,7 +396,7 @@ def weigh(kinds, v, whole, real, potential, severity, changes):
 def analyse_rows(
     failed, half, kinds, x, y, c, s, v, a, offset, distance, n_steps, dt, claims, crosswalks,
     friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed, reverses,
-    gone, whole, real, potential, severity, changes,
+    gone, whole, real, potential, severity, changes, breach,
 ):  # fmt: skip
     """Analyse N rows; failed ones stay as they are.
 
@@ -400,7 +411,7 @@ def analyse_rows(
             lights[i], lamps[i], routed, gone, whole[i], real[i],
         )  # fmt: skip
         name_zones(reverses[i], whole[i])
-        weigh(kinds, v[i], whole[i], real[i], potential[i], severity[i], changes[i])
+        weigh(kinds, v[i], whole[i], real[i], potential[i], severity[i], changes[i], breach[i])
 
 
 @kernel

@@ -150,7 +150,10 @@ def judge_row(n_steps, status, path, friction, facts, record, verdict):
         record.lights, record.lamps, True, verdict.gone, whole, real,
     )  # fmt: skip
     name_zones(verdict.reverses, whole)
-    weigh(facts.kinds, verdict.v, whole, real, verdict.potential, verdict.severity, verdict.changes)
+    weigh(
+        facts.kinds, verdict.v, whole, real, verdict.potential, verdict.severity, verdict.changes,
+        verdict.breach,
+    )  # fmt: skip
     kind, instant = whole[:, KIND], whole[:, INSTANT]
     verdict.until[0] = last_conflict(kind, instant, facts.after, distance.shape[1])
     if path == 0:

@@ -139,9 +139,12 @@ Source: UN R157, 5.2.5.2."""
 MARGIN_ON_FOOT = 1.0
 """``MARGIN`` for pedestrians, cyclists and animals [m]. Source: StVO § 26, ECE pedestrian test
 protocols brake for persons about to step into the path; the metre is ours."""
-HARD = 6.0
-"""Deceleration from which on braking needs a reason [m/s²]. Source: UN R13-H, Annex 3: 6.43 m/s² is
-what the service brakes must give, so that no driver brakes so hard without a reason."""
+HARD = 5.0
+"""Deceleration from which on braking needs a reason [m/s²]. Source: UN R157, 5.3.1: more than 5
+m/s² is an emergency manoeuvre; UN R152: an emergency braking system demands 5 m/s² at least."""
+TOO_CLOSE = 0.9
+"""Time gap below which a follower is too close [s]. Source: BKatV, annex, 12.5 to 12.7, above 80
+km/h: fined below half of half the speedometer, a quarter of the km/h in metres."""
 JUST_NOW = 3.0
 """Time before a contact within which a body's actions count [s]. Ours: lane changes take 3 to 6
 s."""
@@ -156,10 +159,9 @@ OFF_LANE = 1.75
 a lane of 3.5 m. Ours."""
 ALIKE = 0.7
 """Least cosine, in size, of the angle between two approaches of the same road [1]. Ours: 45°."""
-AHEAD_TIME, AHEAD = 2.0, 10.0
-"""Time of travel [s] and distance [m] within which a participant ahead is a reason to brake: 2 s
-and 10 m. Source: StVO § 4; the 2 s are the usual rule of thumb of safe distance, the 10 m are
-ours."""
+AHEAD = 2.0
+"""Distance that a stopping ego keeps to what is in its way [m]; what is nearer than that and the
+way in which `REACTION` and braking by `HARD` stop it is a reason to brake hard. Ours."""
 
 # --- Lights and crosswalks ----------------------------------------------------------------------
 

@@ -20,7 +20,6 @@ from bridgegen.assess.conflict._circumstances_kernels import (
     ahead_until,
     ego_came_over,
     ego_moved,
-    has_reason,
     has_set_off,
     on_crosswalk_since,
     ran_red,
@@ -29,8 +28,12 @@ from bridgegen.assess.conflict._circumstances_kernels import (
     slowing_since,
     steering,
     still_since,
+    strip,
+    unjustified,
 )
 from bridgegen.assess.conflict._codes import (
+    ACROSS,
+    ALONG,
     ASSUMED_RIGHT_BEFORE_LEFT,
     BRAKED_HARD_AHEAD,
     BRAKED_WITHOUT_REASON,
@@ -49,11 +52,14 @@ from bridgegen.assess.conflict._codes import (
     FRONT_LEFT,
     FRONT_RIGHT,
     HEAD_ON,
+    INSTANT,
     INTO_THE_SIDE,
     JUNCTION_OCCUPIED,
+    KIND,
     LEFT_ITS_LANE,
     LEFT_TO_ACT,
     MAP_PRIORITY,
+    NEEDED,
     NEITHER,
     OBJECT,
     OTHER,
@@ -79,10 +85,17 @@ from bridgegen.assess.conflict._codes import (
     TTC,
     TURNING,
     TURNING_GIVES_WAY,
+    TYPE,
+    UNJUSTIFIED_BRAKING,
     UNSAFE_START,
+    V_EGO,
+    V_OTHER,
+    VIOLATION,
     VRU_BY_FRONT,
     VRU_INTO_SIDE,
     WRONG_SIDE,
+    ZONE_EGO,
+    ZONE_OTHER,
 )
 from bridgegen.assess.conflict._geometry_kernels import (
     beside,
@@ -98,6 +111,7 @@ from bridgegen.assess.conflict._limits import (
     COMFORT,
     DOUBTS,
     EVIDENT_EVERY,
+    HALVINGS,
     HARD,
     HORIZON,
     JUST_BEFORE,
@@ -109,10 +123,12 @@ from bridgegen.assess.conflict._limits import (
     MARGIN_ON_FOOT,
     MOVES,
     OFF_LANE,
+    SAME_WAY,
     STANDS,
     STOOD,
     SYSTEM_BRAKING,
     SYSTEM_REACTION,
+    TOO_CLOSE,
     TURN_TIME,
     UNSURE,
 )
@@ -307,7 +323,7 @@ def decide(
     # The order of these rules is that of the table in docs/conflicts.md: the first that applies
     # decides.
     if kind == EGO_STANDING:
-        return of_standing(scene, e, k, whole)
+        return of_standing(scene, e, k, own, whole)
     if kind != REAR_END_STRIKING and kind != REAR_END_STRUCK:
         last = ahead_until(scene, k, real[TTC]) if scene.near else k
         mine, its = ran_red(scene, 0, k, last), ran_red(scene, e, k, last)
@@ -341,7 +357,7 @@ def decide(
 
 
 @kernel
-def of_standing(scene, e, k, whole):
+def of_standing(scene, e, k, own, whole):
     """Decide where the other drives into the ego, which stands.
 
     One that has priority need not brake harder than `COMFORT`, neither from when the ego came into
@@ -356,6 +372,11 @@ def of_standing(scene, e, k, whole):
             if braked(scene, e, 0, since, located(since, came, early), COMFORT) == COLLIDES:
                 whole[DECIDED] = since
                 return EGO, rule_of(claim)
+    ahead = scene.c[0, k] * scene.c[e, k] + scene.s[0, k] * scene.s[e, k] >= SAME_WAY
+    if ahead and own in (REAR, REAR_LEFT, REAR_RIGHT):
+        who = of_braking(scene, e, k, whole)
+        if who != NEITHER:
+            return who, BRAKED_WITHOUT_REASON
     return OTHER, STRUCK_STANDING
 
 
@@ -459,13 +480,63 @@ def of_struck(scene, e, k, whole):
         if claim == 0:
             return EGO, (CUT_IN if moved else TURNING_GIVES_WAY)
         return OTHER, rule_of(claim)
-    # StVO § 4 (1): who drives ahead must not brake hard without a reason, but the one behind keeps
-    # its distance all the same: both are responsible.
-    for i in range(max(k - int(JUST_NOW / scene.dt), 0), k):
-        if scene.a[0, i] <= -HARD and scene.v[0, i] > STANDS and not has_reason(scene, i):
-            whole[DECIDED] = i
-            return SHARED, BRAKED_WITHOUT_REASON
-    return OTHER, REAR_DISTANCE
+    who = of_braking(scene, e, k, whole)
+    return (OTHER, REAR_DISTANCE) if who == NEITHER else (who, BRAKED_WITHOUT_REASON)
+
+
+@kernel
+def of_braking(scene, e, k, whole):
+    """Return who is responsible if the ego has braked hard without a reason just before k.
+
+    StVO § 4 (1): who drives ahead must not do so; the one behind keeps a distance from which it
+    can stop all the same, and shares it where it did not, or could have stopped.
+    """
+    i = unjustified(scene, k - int(JUST_NOW / scene.dt), k)
+    if i < 0:
+        return NEITHER
+    whole[DECIDED], whole[TYPE] = i, UNJUSTIFIED_BRAKING
+    # What a recorded ego braked for may not have been recorded.
+    could = scene.friction == math.inf or braked(scene, e, 0, i, float(i), BRAKING) == CLEAR
+    return SHARED if could or scene.distance[e, i] < TOO_CLOSE * scene.v[e, i] else EGO
+
+
+@kernel
+def force(scene, e, whole, real):
+    """Make it a violation if the ego brakes hard without a reason, and forces e behind it to, too.
+
+    Of all such the one that asks the hardest braking of e. Of a recording, which states no
+    friction, there is none: what its ego braked for may be missing.
+    """
+    c, s, v, gap, worst, end = scene.c, scene.s, scene.v, scene.distance[e], 0.0, 0
+    for k in range(scene.at if scene.friction < math.inf else 0):
+        if k < end or scene.a[0, k] > -HARD:
+            continue
+        end = k + 1
+        while end < scene.at and scene.a[0, end] <= -HARD:
+            end += 1
+        along, aside = strip(scene, e, 0, k)
+        behind = along > 0.0 and aside == 0.0 and gap[k] < HORIZON * v[e, k]
+        if not behind or c[0, k] * c[e, k] + s[0, k] * s[e, k] < SAME_WAY:
+            continue
+        low, needed = COMFORT, BRAKING
+        if braked(scene, e, 0, k, float(k), low) != COLLIDES:
+            continue
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + needed)
+            if braked(scene, e, 0, k, float(k), middle) == COLLIDES:
+                low = middle
+            else:
+                needed = middle
+        if needed <= worst or unjustified(scene, k, end) < 0:
+            continue
+        worst = needed
+        whole[KIND], whole[TYPE] = VIOLATION, UNJUSTIFIED_BRAKING
+        whole[RESPONSIBLE] = SHARED if gap[k] < TOO_CLOSE * v[e, k] else EGO
+        whole[RULE], whole[DECIDED], whole[INSTANT] = BRAKED_WITHOUT_REASON, k, end
+        whole[ZONE_EGO], whole[ZONE_OTHER] = REAR, FRONT
+        real[TTC], real[NEEDED], real[ALONG] = math.inf, needed, 0.0
+        real[ACROSS] = max(v[e, k] - v[0, end], 0.0)  # as if it had not braked
+        real[V_EGO], real[V_OTHER] = v[0, k], v[e, k]
 
 
 @kernel

@@ -239,7 +239,8 @@ def _of_one_body(rollout: Rollout, kernel: Callable[..., None] | None) -> Confli
     kinds = rollout.kinds if rollout.kinds.size else np.zeros(e, np.int64)
     ok = np.asarray(rollout.status) == 0
     real[:, :, codes.TTC] = np.inf
-    potential, severity, changes = np.zeros((n, e)), np.zeros((n, e)), np.zeros((n, e, 2))
+    potential, severity, breach = (np.zeros((n, e)) for _ in range(3))
+    changes = np.zeros((n, e, 2))
     reverses = np.zeros((n, 0, 0), np.bool_) if moving.reverses is None else moving.reverses
     (kernel or kernels.analyse_rows)(
         ~ok, moving.half, np.ascontiguousarray(kinds, dtype=np.int64), moving.x, moving.y,
@@ -251,7 +252,7 @@ def _of_one_body(rollout: Rollout, kernel: Callable[..., None] | None) -> Confli
         np.ascontiguousarray(rollout.stop_lights, dtype=np.int64), np.ascontiguousarray(lines),
         np.ascontiguousarray(lights, dtype=np.int8), np.ascontiguousarray(lamps, dtype=np.int8),
         _is_routed(rollout), reverses, np.empty((e, t)), whole, real,
-        potential, severity, changes,
+        potential, severity, changes, breach,
     )  # fmt: skip
     found: dict[str, Any] = {name: whole[:, :, column] for name, column in WHOLES.items()}
     found |= {name: whole[:, :, column] > 0 for name, column in IS_SO.items()}
@@ -267,7 +268,7 @@ def _of_one_body(rollout: Rollout, kernel: Callable[..., None] | None) -> Confli
         ok=ok,
         body=np.zeros((n, e), np.int64),
         aside=np.zeros((n, e)),
-        breach=np.zeros((n, e)),
+        breach=breach,
     )
 
 

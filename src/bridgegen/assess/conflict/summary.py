@@ -49,6 +49,11 @@ _BY_BOTH = {
 
 
 _CROSSINGS = (ConflictType.CROSSING, ConflictType.TURNING)
+_STRUCK = (
+    ConflictType.REAR_END_STRUCK,
+    ConflictType.UNJUSTIFIED_BRAKING,
+    ConflictType.VRU_INTO_SIDE,
+)
 
 
 def sentence(conflicts: Conflicts, row: int, other: int) -> str:
@@ -106,6 +111,12 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
         aside, v = conflicts.aside[row, other], conflicts.v_ego[row, other]
         if kind == ConflictType.CLOSE_PASS:
             return f"The ego passed {name} at {v:.1f} m/s, {aside:.2f} m beside it"
+        if kind == ConflictType.UNJUSTIFIED_BRAKING:
+            needed = conflicts.needed[row, other]
+            return (
+                f"The ego braked hard at {v:.1f} m/s, and {name} behind it had to brake by "
+                f"{needed:.1f} m/s² at least"
+            )
         left = "the road" if kind == ConflictType.ROAD_DEPARTURE else "its lane"
         side = "left" if aside > 0.0 else "right"
         return f"The ego left {left} by {abs(aside):.1f} m to the {side} at {v:.1f} m/s"
@@ -124,7 +135,7 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
             f"The {its} of {name} {strikes} the {own} of {whole}, which had stood for "
             f"{stood:.1f} s, {speed}"
         )
-    by_other = kind in (ConflictType.REAR_END_STRUCK, ConflictType.VRU_INTO_SIDE)
+    by_other = kind in _STRUCK
     # Whose front meets a side strikes: of 401 sentences, 40 once said that the ego's side struck
     # the other's front.
     if by_other or (kind in _CROSSINGS and "front" in its and "front" not in own):
@@ -146,6 +157,8 @@ def _responsibility(conflicts: Conflicts, row: int, other: int, name: str) -> st
     kind = ConflictType(int(conflicts.type[row, other]))
     if who == Responsible.SHARED and kind in _CROSSINGS:
         words += f", and {name} drove on although comfortable braking would have done"
+    elif who == Responsible.SHARED and kind == ConflictType.UNJUSTIFIED_BRAKING:
+        words += f", and {name} was too close or braked late"
     elif who == Responsible.SHARED and kind == ConflictType.SIDE_SWIPE:
         return f"both are responsible: {name} {words}, and the ego could have avoided it ({source})"
     return f"{_BEARS[who].format(rule=words, other=name)} ({source})"
@@ -157,9 +170,8 @@ def _time_left(conflicts: Conflicts, row: int, other: int) -> str:
     rule = Rule(int(conflicts.rule[row, other]))
     by_others = (
         ConflictType.EGO_STANDING,
-        ConflictType.REAR_END_STRUCK,
         ConflictType.SIDE_SWIPE,
-        ConflictType.VRU_INTO_SIDE,
+        *_STRUCK,
     )
     left = conflicts.left[row, other]
     arose = f"the risk arose {left:.1f} s before"

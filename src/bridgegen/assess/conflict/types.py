@@ -28,6 +28,7 @@ class ConflictType(IntEnum):
     LANE_DEPARTURE = _codes.LANE_DEPARTURE
     ROAD_DEPARTURE = _codes.ROAD_DEPARTURE
     CLOSE_PASS = _codes.CLOSE_PASS
+    UNJUSTIFIED_BRAKING = _codes.UNJUSTIFIED_BRAKING
 
     @property
     def label(self) -> str:
@@ -55,6 +56,7 @@ _TYPE_LABELS = {
     ConflictType.LANE_DEPARTURE: "lane departure",
     ConflictType.ROAD_DEPARTURE: "road departure",
     ConflictType.CLOSE_PASS: "close pass",
+    ConflictType.UNJUSTIFIED_BRAKING: "unjustified braking",
 }
 
 _TYPE_SOURCES = {
@@ -72,6 +74,7 @@ _TYPE_SOURCES = {
     ConflictType.LANE_DEPARTURE: "NHTSA: drifting, opposite direction; GIDAS 1, 6",
     ConflictType.ROAD_DEPARTURE: "NHTSA: road edge departure, control loss; GIDAS 1",
     ConflictType.CLOSE_PASS: "NHTSA: pedalcyclist, pedestrian; GIDAS 6",
+    ConflictType.UNJUSTIFIED_BRAKING: "NHTSA: lead vehicle decelerating; GIDAS 6",
 }
 
 
@@ -169,8 +172,8 @@ RULES = {
         "RSS (Shalev-Shwartz et al., 2017), definition 1; StVO § 4 (1)",
     ),
     Rule.BRAKED_WITHOUT_REASON: (
-        "braked hard without a reason ahead, and the vehicle behind was too near",
-        "StVO § 4 (1)",
+        "braked hard although nothing in or entering its way asked for it",
+        "StVO § 4 (1), sentence 2; Vienna Convention, Art. 17 (1)",
     ),
     Rule.CUT_IN: (
         "cut in so closely that braking from then on could not have avoided it",

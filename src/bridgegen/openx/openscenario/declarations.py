@@ -67,6 +67,10 @@ NOISE_KEY = "noise_key"
 it follows from the values of the file's parameters."""
 
 
+GHOST = "ghost"
+"""Property of a controller, ``ghost.NAME.KEY``: what its sensors report and is not there."""
+
+
 @dataclass(frozen=True)
 class Property(Element):
     """A name and a value that the standard leaves to the user."""

@@ -2,6 +2,7 @@
 
 import { boxCentre, boxCorners, isPlaced, nearestTo, playersOf, stateAt } from "./geometry.js";
 import { ghostsAt } from "./ghosts.js";
+import { phantomsAt } from "./unpack.js";
 
 const AROUND_BODIES = 5; // m around the bodies
 const LEAST_SCALE = 8; // pixels per metre at which a car is still seen well
@@ -54,6 +55,7 @@ export class Camera {
     });
     const ghosts = ghostsAt(this.kept, state).filter(({ entity, off }) => [0, this.partner].includes(entity) && off < GHOST_WITHIN);
     corners.push(...ghosts.flatMap(({ entity, x, y, h }) => boxCorners(this.kept.entities[entity], x, y, h)));
+    corners.push(...phantomsAt(this.kept, state.index).filter(({ dx, dy }) => Math.hypot(dx, dy) < GHOST_WITHIN).map(({ x, y }) => [x, y]));
     view.fit(corners, AROUND_BODIES, [LEAST_SCALE, MOST_SCALE]);
     view.keep(centre, EGO_WITHIN);
   }

@@ -51,6 +51,7 @@ export function conflictLines(found) {
       line("rule", found.rule ?? "–", `${found.rule_says ?? ""} (${found.rule_source ?? ""})`), line("decided at", figure("decided")),
     );
   }
+  if (found.type === "unjustified braking" && found.conflict === "violation") return [...lines, line(`braking asked of ${found.partner}`, figure("needed_deceleration"), "at least, after 0.75 s"), line("speed of the ego", figure("v_ego")), line("harm", figure("harm"))];
   if (found.conflict === "violation") return [...lines, line("by", figure("aside"), "beyond the border of its lanes or the edge of the road; of a pass the clearance"), line("speed of the ego", figure("v_ego")), line("harm", figure("harm"))];
   if (ZONED.includes(found.conflict)) {
     lines.push(

@@ -11,7 +11,7 @@ import { ghostsAt, ghostsOf } from "./ghosts.js";
 import { Save } from "./save.js";
 import { Scene } from "./scene.js";
 import { detectionAt, lightAt, unpack, weatherAt } from "./unpack.js";
-import { stateWords } from "./words.js";
+import { phantomWords, stateWords } from "./words.js";
 
 const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 const PLAY_ICON = "M4 2v12l10-6z";
@@ -175,7 +175,7 @@ export class Player {
     }
     if (has.elsewhere) $("elsewhere-means").textContent = [...new Set(ghostsOf(this.kept).map(({ means }) => means))].join("; ");
     if (has.elsewhere) $("elsewhere-button").textContent = ghostsOf(this.kept).some(({ simulator }) => simulator) ? "Elsewhere" : "Other driver";
-    if (this.kept.sensed) $("displaced-means").textContent = `displaced by over ${this.kept.sensed.tolerance} m`;
+    if (this.kept.sensed) $("displaced-means").textContent = `displaced by over ${this.kept.sensed.tolerance} m${this.kept.sensed.phantoms.length ? ", or nothing is there" : ""}`;
   }
 
   // Who is which colour, for the legend.
@@ -271,7 +271,7 @@ export class Player {
     const contact = this.kept.contacts.some((k) => state.index >= k && state.index < k + 1 / this.kept.time_step);
     const diverges = this.twin && state.index === this.kept.diverged;
     const found = ZONED.includes(this.kept.conflict?.conflict) ? this.kept.conflict : null;
-    const label = contact ? "collision" : diverges ? "drivers diverge here" : state.index === found?.instant ? "least time to collision" : state.index === found?.decided ? "decided here" : state.index === this.kept.closest ? "minimum distance" : "";
+    const label = contact ? "collision" : diverges ? "drivers diverge here" : state.index === found?.instant ? "least time to collision" : state.index === found?.decided ? "decided here" : state.index === this.kept.closest ? "minimum distance" : phantomWords(this.kept, state.index)[0] ?? "";
     flag.hidden = !label;
     flag.className = contact ? "" : "near";
     flag.textContent = label;

@@ -2,7 +2,7 @@
 
 import { palette } from "./colours.js";
 import { boxCentre, isPlaced } from "./geometry.js";
-import { detectionAt } from "./unpack.js";
+import { detectionAt, phantomsAt } from "./unpack.js";
 
 // Seen: four corners about the detected box. Displaced: that box dashed, and a line from where the body is.
 // Missed: the body itself is hatched and ringed.
@@ -13,6 +13,7 @@ export function drawDetections(c, kept, state, scale) {
     if (found.status === "missed") drawMissed(c, kept.entities[e], s, scale);
     else drawFound(c, found, scale);
   });
+  for (const found of phantomsAt(kept, state.index)) drawFound(c, found, scale);
 }
 
 /** @type {(c: CanvasRenderingContext2D, found: any, scale: number) => void} */
@@ -39,7 +40,7 @@ function drawFound(c, { status, x, y, h, length, width, truth }, scale) {
     }
     c.stroke();
     c.restore();
-    if (!displaced) continue;
+    if (!displaced || !truth) continue;
     c.setLineDash([]);
     c.beginPath();
     c.moveTo(truth[0], truth[1]);

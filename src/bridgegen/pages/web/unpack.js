@@ -65,7 +65,10 @@ function unpackSensed(packed, n) {
       };
     });
   });
-  return { steps, frame: holding(steps, n), entities, tolerance: packed.tolerance };
+  const phantoms = packed.phantoms.flat().map(([frame, dx, dy, h, length, width, confidence, kind]) => (
+    { frame, dx: dx / scale.length, dy: dy / scale.length, h: h / scale.h, length: length / scale.length, width: width / scale.width, confidence: confidence / scale.confidence, kind: packed.kinds[kind] }
+  ));
+  return { steps, frame: holding(steps, n), entities, phantoms, tolerance: packed.tolerance };
 }
 
 function unpackCourse(packed, n) {
@@ -98,6 +101,14 @@ export function detectionAt(kept, e, index) {
     status: off > kept.sensed.tolerance ? "displaced" : "seen", off, sensor: SENSORS[found.by], kind: found.kind, counts: found.counts,
     confidence: found.confidence, x: cx + found.dx, y: cy + found.dy, h: h + found.dh, length: found.length, width: found.width, truth: [cx, cy],
   };
+}
+
+// What the sensors reported in the latest frame where nothing is.
+export function phantomsAt(kept, index) {
+  const frame = kept.sensed?.frame[index] ?? -1;
+  if (frame < 0) return [];
+  const k = kept.sensed.steps[frame], [x, y] = [kept.x[0][k], kept.y[0][k]];
+  return kept.sensed.phantoms.filter((one) => one.frame === frame).map((one) => ({ ...one, status: "displaced", truth: null, x: x + one.dx, y: y + one.dy }));
 }
 
 export function lightAt(lamp, index) {

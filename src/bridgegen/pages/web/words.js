@@ -3,7 +3,7 @@
 import { intentionAt } from "./course.js";
 import { isPlaced, playersOf } from "./geometry.js";
 import { elsewhereWords } from "./ghosts.js";
-import { SIGNALS, detectionAt, lightAt, showsAt, weatherAt } from "./unpack.js";
+import { SIGNALS, detectionAt, lightAt, phantomsAt, showsAt, weatherAt } from "./unpack.js";
 
 const INDICATORS = ["", "indicates left", "indicates right", "hazard lights on"];
 
@@ -17,6 +17,11 @@ export function detectionWords(found) {
   if (found.status === "missed") return "missed";
   const off = found.status === "displaced" ? `seen ${found.off.toFixed(1)} m off` : "seen";
   return found.kind ? `${off}, as ${found.kind}` : off;
+}
+
+/** What the sensors report where nothing is. */
+export function phantomWords(kept, index) {
+  return phantomsAt(kept, index).map(({ dx, dy }) => `ghost ${Math.hypot(dx, dy).toFixed(0)}\u00a0m`);
 }
 
 function intentionWords(kept, state) {
@@ -44,6 +49,7 @@ export function stateWords(kept, state) {
     const told = [...lampWords(showsAt(kept.entities[e], state.index)), detectionWords(detectionAt(kept, e, state.index))].filter(Boolean);
     parts.push([`${s.name} ${value(s.v, "m/s", 1)}`, ...told].join(", "));
   }
+  parts.push(...phantomWords(kept, state.index).map((words) => `sensors report a ${words} away, where nothing is`));
   state.entities.forEach((s, e) => {
     const off = elsewhereWords(kept, state, e);
     if (off) parts.push(`${s.name} ${off}`);

@@ -299,6 +299,7 @@ class LogicalScenario(SearchedScenario):
             types,
             models,
             ways,
+            self.story.ghosts,
             self.criteria,
             self.clauses,
             self.matrix,

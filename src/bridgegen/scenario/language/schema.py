@@ -39,6 +39,7 @@ from bridgegen.scenario.language.schema_types import (
 )
 from bridgegen.scenario.language.story_schema import (
     EventSection,
+    GhostSection,
     JamSection,
     ParticipantSection,
     WorksSection,
@@ -287,6 +288,8 @@ class ScenarioFile(ShapedSection):
     """Queues of standing vehicles by name (layer 3)."""
     road_works: dict[str, WorksSection] = {}
     """Lanes closed by cones, by name (layer 3)."""
+    ghosts: dict[str, GhostSection] = {}
+    """False positives of the ego's sensors by name: what they report and is not there."""
     effects: list[EffectSection] = []
     """Functions of your own that add to each scenario."""
     parameters: dict[str, ParameterSection] = {}

@@ -388,6 +388,25 @@ class RoadWorks:
     sign: Waypoint
 
 
+GHOST_UNITS = {"at": "m", "rate": "1/m", "appears": "m", "vanishes": "m", "lifetime": "s"}
+"""The numbers of a ghost, with their units; see ``GhostSection``."""
+
+
+@dataclass(frozen=True)
+class Ghost:
+    """What the ego's sensors report and is not there.
+
+    Attributes:
+        name: of it.
+        type: what it is taken for, one of `bridgegen.scenario.participants.TYPES`.
+        numbers: those of `GHOST_UNITS` that it has, by name: either at or rate.
+    """
+
+    name: str
+    type: str
+    numbers: Mapping[str, Quantity]
+
+
 @dataclass(frozen=True)
 class Story:
     """Layers 3 and 4 of a logical scenario.
@@ -397,12 +416,14 @@ class Story:
         events: what happens.
         jams: queues; their vehicles are among the participants.
         works: closed lanes.
+        ghosts: false positives of the ego's sensors.
     """
 
     participants: tuple[Participant, ...] = ()
     events: tuple[EventSpec, ...] = ()
     jams: tuple[Jam, ...] = field(default=())
     works: tuple[RoadWorks, ...] = field(default=())
+    ghosts: tuple[Ghost, ...] = field(default=(), repr=False)
 
     @property
     def later_weathers(self) -> tuple[str, ...]:

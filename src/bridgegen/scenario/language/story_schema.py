@@ -7,6 +7,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from bridgegen.scenario.language.schema_types import (
     Acceleration,
     Angle,
+    Curvature,
     Duration,
     LaneField,
     Length,
@@ -259,6 +260,23 @@ class JamSection(ShapedSection):
     """Types of the vehicles, the last first."""
     gap: Length = 3.0
     """Gap between two vehicles [m]."""
+
+
+class GhostSection(ShapedSection):
+    """Something that the ego's sensors report and that is not there."""
+
+    type: Annotated[TypeName, AfterValidator(canonical)] = "car"
+    """Type of participant that it is taken for."""
+    at: Length | None = None
+    """Place along the ego's route at which it seems to stand, from the ego's start [m]."""
+    rate: Curvature | None = None
+    """Births per distance travelled instead of a place [1/m], at random in the region ahead."""
+    appears: Length
+    """Largest distance ahead of the ego's front at which it is reported [m]."""
+    vanishes: Length = 0.0
+    """Distance ahead of the ego's front below which it is not reported any more [m]."""
+    lifetime: Duration = 60.0
+    """Longest time for which it is reported [s]; of births at random the mean."""
 
 
 class WorksSection(ShapedSection):

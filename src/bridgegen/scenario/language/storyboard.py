@@ -18,11 +18,13 @@ from bridgegen.scenario.language.roads import LETTERS, Quantity, RoadsSpec
 from bridgegen.scenario.language.schema_types import Formula, ShapedSection, Text, section
 from bridgegen.scenario.language.story import (
     CONDITIONS,
+    GHOST_UNITS,
     Action,
     Arrival,
     Change,
     ConditionSpec,
     EventSpec,
+    Ghost,
     Indication,
     KeepDistance,
     LaneChange,
@@ -36,6 +38,7 @@ from bridgegen.scenario.language.story_schema import (
     ACTIONS,
     ConditionSection,
     EventSection,
+    GhostSection,
     ParticipantSection,
     WaypointSection,
 )
@@ -66,6 +69,7 @@ class Storyboard:
     Attributes:
         participants: as ``LogicalScenario`` holds them.
         events: likewise.
+        ghosts: likewise.
         known: the participants' names, also of those that are described wrongly.
 
     Args:
@@ -92,6 +96,7 @@ class Storyboard:
         self.participants = tuple(self._participants())
         self._acting = {participant.name: participant for participant in self.participants}
         self.events = tuple(self._events())
+        self.ghosts = tuple(self._ghosts())
 
     # -- participants --------------------------------------------------------------------------
 
@@ -241,6 +246,25 @@ class Storyboard:
             types=self._choices.types(given),
             model=given.model or "",
         )
+
+    def _ghosts(self) -> Iterator[Ghost]:
+        for key, data in entries(self._quantities.document, "ghosts"):
+            name, path = str(key), ("ghosts", key)
+            given = section(GhostSection, data)
+            if given is None:
+                continue
+            if not name.isidentifier() or not name.isascii():
+                self._report(f"a ghost's name is a word, got '{name}'", path)
+            if (given.at is None) == (given.rate is None):
+                self._report(f"ghost {name} must have a place (at) or a rate, one of the two", path)
+            numbers = {w: value for w in GHOST_UNITS if (value := getattr(given, w)) is not None}
+            for word, value in numbers.items():
+                above = word in ("rate", "appears", "lifetime")
+                self._check(value, GHOST_UNITS[word], (*path, word), above=above)
+            near, far = given.vanishes, given.appears
+            if not isinstance(near, str) and not isinstance(far, str) and near >= far:
+                self._report(f"vanishes < appears [m] must hold, got {near:g} and {far:g}", path)
+            yield Ghost(name, given.type, numbers)
 
     def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check model and own body, if there are: what the type's has none of, it has not."""

@@ -21,6 +21,7 @@ from bridgegen.scenario.ontology.roads import add_road_network
 from bridgegen.scenario.ontology.site import Site
 from bridgegen.scenario.ontology.story import (
     add_event,
+    add_ghosts,
     add_jam,
     add_participant,
     add_weather,
@@ -167,6 +168,7 @@ def build(
     put(top, "has_road_network", add_road_network(builder, place))
     for participant in story.participants:
         put(top, "has_participant", add_participant(builder, participant, place, driver, ideal))
+    add_ghosts(builder, story.ghosts)
     for event in story.events:
         put(top, "has_event", add_event(builder, event, declared, place))
     for name, course in (courses or {}).items():

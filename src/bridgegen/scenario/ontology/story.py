@@ -13,6 +13,7 @@ from bridgegen.scenario.language.story import (
     Change,
     ConditionSpec,
     EventSpec,
+    Ghost,
     Indication,
     Jam,
     KeepDistance,
@@ -116,6 +117,17 @@ def add_participant(
         )
         put(node, "has_route", route)
     return node
+
+
+def add_ghosts(builder: Builder, ghosts: Iterable[Ghost]) -> None:
+    """Add the false positives of the ego's sensors, which its controller has."""
+    for ghost in ghosts:
+        node = builder.node(ghost.name, "Ghost")
+        builder.put(node, "has_name", ghost.name)
+        builder.put(node, "has_ghost_type", ghost.type)
+        for name, value in ghost.numbers.items():
+            builder.quantity(node, f"has_ghost_{name}", value)
+        builder.put(builder.iri(f"{EGO}_controller"), "has_ghost", node)
 
 
 def _add_body(builder: Builder, node: ox.NamedNode, body: Body) -> None:

@@ -190,6 +190,10 @@ _TITLES: Mapping[ConflictType, tuple[str, str]] = {
     ConflictType.LANE_DEPARTURE: ("", "leaves its lane"),
     ConflictType.ROAD_DEPARTURE: ("", "leaves the road"),
     ConflictType.CLOSE_PASS: ("", "passes {} too closely"),
+    ConflictType.UNJUSTIFIED_BRAKING: (
+        "brakes without a reason and is hit in the rear by {}",
+        "brakes without a reason and forces {} to brake hard",
+    ),
 }
 _ARTICLES = {"": "another participant", "other": "an object", "animal": "an animal"}
 _RESPONSIBLE = {

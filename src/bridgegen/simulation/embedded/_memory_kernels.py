@@ -80,6 +80,7 @@ class Plan(NamedTuple):
     drives: Int
     weathers: Int
     scene: Float
+    ghosts: Int
     others: Int
     attends: int
     heeds: int
@@ -243,9 +244,9 @@ class State(NamedTuple):
         chassis: ``(MOTION,)`` how the ego's vehicle moves, if it has dynamics; see
             ``_chassis_columns`` and ``_multi_body_columns``.
         key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.drivers.noise`.
-        sensors: ``(E, MEMORY)``, between two frames; see ``ego._perception_kernels``.
-        tracks: ``(E, TRACK)`` what the ego perceives; see ``ego._tracking_kernels``.
-        around: ``(E, AROUND)`` the same from its route; see ``ego._surroundings_kernels``.
+        sensors: ``(E + G, MEMORY)``, between two frames; see ``ego._perception_kernels``.
+        tracks: ``(E + G, TRACK)`` what it perceives, ghosts last; see ``ego._tracking_kernels``.
+        around: ``(E + G, AROUND)`` the same from its route; see ``ego._surroundings_kernels``.
         passages: ``(·, PASSAGE)`` what it predicts; see ``ego._prediction_kernels``.
         feet: ``(W,)`` [m], stations of the tracks on the ways that they may be on.
         mind: ``(·,)`` its further state; see ``ego._reference_kernels``, or the memory of a user's
@@ -340,9 +341,9 @@ class State(NamedTuple):
     attention: Annotated[Float, "entities", 3]
     chassis: Annotated[Float, "motion"]
     key: Annotated[npt.NDArray[np.uint64], 1]
-    sensors: Annotated[Float, "entities", "sensors"]
-    tracks: Annotated[Float, "entities", "track"]
-    around: Annotated[Float, "entities", "around"]
+    sensors: Annotated[Float, "perceived", "sensors"]
+    tracks: Annotated[Float, "perceived", "track"]
+    around: Annotated[Float, "perceived", "around"]
     passages: Annotated[Float, "passages", "passage"]
     feet: Annotated[Float, "hypotheses"]
     mind: Annotated[Float, "mind"]
@@ -362,7 +363,7 @@ class State(NamedTuple):
 class Record(NamedTuple):
     """The outputs: ``(E, T)`` per body, ``(L, T)`` lights, ``(V,)`` events; see `Rollout`.
 
-    ``detections`` are ``(E, T, 8)``, or ``(0, 0, 8)`` where the driver perceives nothing;
+    ``detections`` are ``(E + G, T, 8)``, or ``(0, 0, 8)`` where the driver perceives nothing;
     ``present`` is ``(E, T)``, or ``(0, 0)`` if all entities always are; ``lamps`` ``(E, T)``, or
     ``(0, 0)`` if the storyboard switches none.
     """

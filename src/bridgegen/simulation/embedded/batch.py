@@ -310,6 +310,7 @@ class Batch:
         """Return what is recorded; all rows must have ended."""
         program, roads, record = self._program, self._roads, self.record
         corridors, corridor_of = self._corridors()
+        seen = record.detections
         return Rollout(
             time_step=program.time_step,
             names=program.names,
@@ -328,7 +329,8 @@ class Batch:
             event_actors=tuple(program.actors),
             present=NO_PRESENCE if record.present.all() else record.present,
             lamps=record.lamps if record.lamps.size else NO_LAMPS,
-            detections=record.detections if record.detections.size else NO_DETECTIONS,
+            detections=seen[:, : len(program.names)] if seen.size else NO_DETECTIONS,
+            ghosts=seen[:, len(program.names) :] if len(program.ghosts) else NO_DETECTIONS,
             stop_lines=roads.stop_lines[self._rows],
             stop_lights=roads.stop_lights,
             stop_entities=roads.stop_entities,
@@ -490,6 +492,7 @@ def _state(
 ) -> memory.State:
     """Return the state of N rows before they start; ``start`` sets what else is not 0."""
     n, e = len(rows), len(program.names)
+    m = e - 1 + len(program.ghosts)
     start = slots[:, np.maximum(program.start_slots, 0)]  # of no effect where there is no slot
     varied = slots[:, np.maximum(program.aside_slots, 0)]
     hypotheses = roads.scene.hypotheses.shape[1]
@@ -497,6 +500,7 @@ def _state(
     wants = compiled.wants if compiled else ()
     sizes = {
         "entities": e,
+        "perceived": m + 1,
         "slots": slots.shape[1],
         "weather": WEATHER,
         "probes": len(program.probes),
@@ -518,21 +522,21 @@ def _state(
         "track": TRACK,
         "motion": MOTIONS[program.vehicle],
         "around": AROUND,
-        "passages": 2 * e + hypotheses,
+        "passages": 2 * (m + 1) + hypotheses,
         "passage": PASSAGE,
         "hypotheses": hypotheses,
         "mind": MIND if compiled is None else compiled.memory or 0,
         "inputs": N_INPUTS,
         "ahead": ROUTE_POINTS if compiled else 0,
-        "others": e - 1 if compiled else 0,
+        "others": m if compiled else 0,
         "lanes": LANES if "lanes" in wants else 0,
         "place": 1 + NEAR_PIECES if "map" in wants else 0,
         "nearby": drivers.MEMORY if "map" in wants else 0,
         "signals": len(program.lights) if "map" in wants else 0,
-        "conflicts": e - 1 if "conflicts" in wants else 0,
+        "conflicts": m if "conflicts" in wants else 0,
         "conflict_ways": CONFLICT_WAYS,
         "conflict": CONFLICT.itemsize // 8,
-        "tracked": e - 1 if "history" in wants else 0,
+        "tracked": m if "history" in wants else 0,
         "instants_tracked": HISTORY,
         "frames": frames(program.time_step) if "history" in wants else 0,
         "answer": ANSWER,
@@ -549,10 +553,11 @@ def _state(
 
 def _record(program: Program, n: int) -> memory.Record:
     shape = (n, len(program.names), program.n_steps)
+    perceived = (n, len(program.names) + len(program.ghosts), program.n_steps, DETECTION)
     # Not zeros: kernels write every instant up to the row's last, and repeat that one to the end.
     x, y, h, v, a, offset = (np.empty(shape) for _ in range(6))
     perceives = program.driver.perceives
-    seen = (*shape, DETECTION) if perceives else (n, 0, 0, DETECTION)
+    seen = perceived if perceives else (n, 0, 0, DETECTION)
     there = shape if program.comes_and_goes else (n, 0, 0)
     return memory.Record(
         x=x,

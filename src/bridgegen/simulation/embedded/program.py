@@ -280,6 +280,8 @@ class Program:
         vehicle: how its body moves, one of `bridgegen.simulation.vehicles.VEHICLES`.
         chassis: of a vehicle with dynamics, see ``_chassis_columns`` and ``_multi_body_columns``;
             else empty.
+        ghosts: ``(G, 8)`` false positives of the ego's sensors, see
+            `bridgegen.drivers._ghost_kernels`.
         others: ``(E,)`` who drives each of the others, a code of
             `bridgegen.drivers.drivers`; the ego's is not looked at.
         time_step: [s].
@@ -350,6 +352,7 @@ class Program:
     driver: Driver
     vehicle: str
     chassis: Float
+    ghosts: Int
     others: Int
     time_step: float
     n_steps: int

@@ -8,9 +8,10 @@ from functools import partial
 from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import EntityBody, entity_body
-from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, SIREN
+from bridgegen.openx.openscenario.declarations import DRIVER, GHOST, IDEAL, SIREN
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity, quoted_element
 from bridgegen.openx.openscenario.values import Double, format_double
+from bridgegen.scenario.language.story import GHOST_UNITS
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import Subject
 from bridgegen.scenario.participants import PARTICIPANTS, Body, ParticipantKind
@@ -66,7 +67,9 @@ class Cast:
         )
 
 
-def scenario_object(individuals: Individuals, name: str, node: Subject) -> osc.ScenarioObject:
+def scenario_object(
+    individuals: Individuals, quantities: Quantities, name: str, node: Subject
+) -> osc.ScenarioObject:
     """Return an entity.
 
     Raises:
@@ -74,7 +77,7 @@ def scenario_object(individuals: Individuals, name: str, node: Subject) -> osc.S
         UnsupportedError: it is of a class that has no counterpart.
     """
     controller = individuals.optional_link(node, "has_controller")
-    controllers = () if controller is None else (_controller(individuals, controller),)
+    controllers = () if controller is None else (_controller(individuals, quantities, controller),)
     return osc.ScenarioObject(name, _body(individuals, node), controllers)
 
 
@@ -122,7 +125,9 @@ def _lifted(individuals: Individuals, node: Subject) -> Iterator[osc.Property]:
             yield osc.Property(name, text)
 
 
-def _controller(individuals: Individuals, node: Subject) -> osc.ObjectController:
+def _controller(
+    individuals: Individuals, quantities: Quantities, node: Subject
+) -> osc.ObjectController:
     """Return a named controller; another driver replaces it or its property.
 
     To esmini it is an external one, which stays idle until it is activated; a type that esmini
@@ -132,6 +137,15 @@ def _controller(individuals: Individuals, node: Subject) -> osc.ObjectController
     said = [osc.Property(DRIVER, driver), osc.Property("esminiController", _ESMINI_CONTROLLER)]
     if individuals.optional_text(node, "has_ideal_stages") is not None:
         said.append(osc.Property(IDEAL, plain_text(individuals, node, "has_ideal_stages")))
+    for ghost in individuals.links(node, "has_ghost"):
+        key = f"{GHOST}.{plain_text(individuals, ghost, 'has_name')}"
+        kind = plain_text(individuals, ghost, "has_ghost_type")
+        said.append(osc.Property(f"{key}.type", kind))
+        for word in GHOST_UNITS:
+            if individuals.optional_number(ghost, f"has_ghost_{word}") is not None:
+                value = quantities.get(ghost, f"has_ghost_{word}")
+                text = format_double(value) if isinstance(value, float) else value
+                said.append(osc.Property(f"{key}.{word}", text))
     properties = osc.Properties(tuple(said))
     name = plain_text(individuals, node, "has_name")
     return osc.ObjectController(osc.Controller(name, properties))

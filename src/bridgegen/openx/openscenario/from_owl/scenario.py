@@ -87,7 +87,7 @@ class _Converter:
             ),
             osc.Entities(
                 tuple(
-                    scenario_object(self.individuals, name, node)
+                    scenario_object(self.individuals, self.quantities, name, node)
                     for name, node in (self.participants | elements).items()
                 )
             ),

@@ -274,6 +274,7 @@ class _Compiler:
         first_time = -1 if time is None else self.tables.slot(time[0])
         waits = (table(self.triggers.probes, 11)[:, PROBE] == END_OF_ROAD).any()
         leaves = len(objects) > 1 and not waits and not declared.stands(self.scenario, self.place)
+        ghosts = declared.ghosts(self.controllers, self.tables)  # before the slots are read
         moves = declared.vehicle(self.controllers, self.place, vehicle, has_driver=has_driver)
         return Program(
             place=self.place,
@@ -344,6 +345,7 @@ class _Compiler:
             driver=chosen if ideal is None else chosen.idealised(ideal),
             vehicle=moves,
             chassis=self._chassis(moves, objects[0], bodies[0], tows),
+            ghosts=ghosts,
             others=others_drivers,
             time_step=step,
             n_steps=n_steps,

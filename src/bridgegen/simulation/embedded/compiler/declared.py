@@ -6,13 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from bridgegen.base.arrays import Int
 from bridgegen.base.errors import InputError, UnknownNameError, UnsupportedError
 from bridgegen.drivers import DRIVERS, GUESTS, STORYBOARD, Driver, get, is_planner, is_spec, split
 from bridgegen.drivers.drivers import OTHERS
+from bridgegen.drivers.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
     DEFAULT_TIME_STEP,
     DRIVER,
+    GHOST,
     IDEAL,
     NOISE_KEY,
     ROAD_END,
@@ -23,9 +26,11 @@ from bridgegen.openx.openscenario.declarations import (
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.parameters import kind_of
 from bridgegen.openx.openscenario.values import Kind, Value
+from bridgegen.scenario.language.story import GHOST_UNITS
+from bridgegen.scenario.participants import PARTICIPANTS
 from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
-from bridgegen.simulation.embedded.compiler.tables import Tables
+from bridgegen.simulation.embedded.compiler.tables import Tables, table
 from bridgegen.simulation.vehicles import KINEMATIC, require
 
 LEAST_STEP, MOST_STEP = 1e-4, 1.0  # s
@@ -184,6 +189,52 @@ def noise_key(controllers: Controllers, place: str) -> int | None:
                 )
             return int(str(text))
     return None
+
+
+def ghosts(controllers: Controllers, tables: Tables) -> Int:
+    """Return `Program.ghosts`, which the ego's controllers name.
+
+    Raises:
+        InputError: a key that no ghost has, one that is missing, or a value that none may have.
+    """
+    said: dict[str, dict[str, osc.Property]] = {}
+    for controller in controllers.of(0):
+        for item in controller.properties.properties if controller.properties else ():
+            prefix, _, rest = str(item.name).partition(".")
+            if prefix == GHOST:
+                name, _, word = rest.partition(".")
+                said.setdefault(name, {})[word] = item
+    rows = []
+    for name, words in said.items():
+        where = f"{tables.place}, line {next(iter(words.values())).line}: {GHOST}.{name}"
+        has = words.keys()
+        if not (
+            {"type", "appears"} <= has <= {"type", *GHOST_UNITS} and ("at" in has) ^ ("rate" in has)
+        ):
+            raise InputError(
+                f"{where} must have type, appears, and at or rate; may have vanishes and lifetime; "
+                f"got {', '.join(words)}"
+            )
+        said_type = tables.text(words["type"].value)
+        if said_type not in PARTICIPANTS:
+            known = ", ".join(PARTICIPANTS)
+            raise InputError(f"{where}.type must be one of {known}, got '{said_type}'")
+        slots = {"vanishes": tables.slot(0.0), "lifetime": tables.slot(60.0)}
+        for word in (word for word in GHOST_UNITS if word in words):
+            text = words[word].value
+            varies = isinstance(text, osc.ParameterRef) and text.name in tables.parameters
+            value: Value | None = text if varies else _number(tables.text(text))
+            if value is None or not 0.0 <= tables.declared(value) < math.inf:
+                raise InputError(
+                    f"{where}.{word} [{GHOST_UNITS[word]}] must be a finite number of at least 0, "
+                    f"got '{text}'"
+                )
+            slots[word] = tables.slot(value)
+        kind = PARTICIPANTS[said_type]
+        size = tables.slot(kind.body.length), tables.slot(kind.body.width)
+        what = NAMES.index(kind.seen_as.name)
+        rows.append((*(slots.get(word, -1) for word in GHOST_UNITS), *size, what))
+    return table(rows, 8)
 
 
 # --- The elements of a storyboard in the order of the file ---

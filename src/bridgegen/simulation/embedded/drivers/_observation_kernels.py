@@ -6,6 +6,7 @@
 import math
 
 from bridgegen.base.compiled import bundled, bundled_row, kernel
+from bridgegen.drivers._ghost_kernels import haunt
 from bridgegen.drivers._path_kernels import CURVATURE, locate, pose
 from bridgegen.drivers._perception_kernels import perceive
 from bridgegen.simulation.embedded._memory_kernels import (
@@ -27,6 +28,7 @@ def observe(k, plan, roads, state, record, step, route, tracks):
         record.h, record.v, plan.bodies, plan.kinds, state.lamps, state.weather, state.sensors,
         state.tracks, record.detections,
     )  # fmt: skip
+    haunt(k, plan, roads, state, record)
     for e in range(tracks.shape[0]):
         for i in range(tracks.shape[1]):
             tracks[e, i] = state.tracks[e + 1, i]

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.drivers._ghost_kernels import WHAT
 from bridgegen.drivers._tracking_kernels import TRACK
 from bridgegen.drivers.compiled import CONFLICT
 from bridgegen.drivers.driver_process import DriverError, DriverProcess
@@ -121,7 +122,7 @@ class Wheel:
     def __init__(
         self, program: Program, batch: Batch, driver: DriverProcess, note: Note | None = None
     ) -> None:
-        n, m = len(batch.running), len(program.names) - 1
+        n, m = len(batch.running), len(program.names) - 1 + len(program.ghosts)
         self._time_step, self._batch, self._driver = program.time_step, batch, driver
         self._route, self._tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK))
         self._stop, self._light = np.full(n, np.inf), np.zeros(n, dtype=np.int8)
@@ -234,4 +235,6 @@ class Wheel:
 
 def _scene(program: Program) -> Scene:
     sizes: Any = (float(value) for value in program.bodies[0, :7])
-    return Scene(program.time_step, program.n_steps, program.names[1:], program.kinds[1:], *sizes)
+    names = program.names[1:] + tuple(f"ghost_{g + 1}" for g in range(len(program.ghosts)))
+    kinds = np.concatenate((program.kinds[1:], program.ghosts[:, WHAT]))
+    return Scene(program.time_step, program.n_steps, names, kinds, *sizes)
