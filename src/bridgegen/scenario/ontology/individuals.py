@@ -20,6 +20,7 @@ from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.roads import add_road_network
 from bridgegen.scenario.ontology.site import Site
 from bridgegen.scenario.ontology.story import (
+    EGO,
     add_event,
     add_jam,
     add_participant,
@@ -130,6 +131,7 @@ def build(
     *,
     driver: str,
     ideal: str = "",
+    odd: str = "",
     site: Site | None = None,
     courses: Mapping[str, Float] | None = None,
 ) -> Individuals:
@@ -141,6 +143,7 @@ def build(
             may be absent where ``site`` is given.
         driver: the ego's driver.
         ideal: its stages that are ideal, separated by commas.
+        odd: the ego's, as `bridgegen.scenario.weather.limits_text` writes it.
         site: the intersection of a map that was made elsewhere; by default a crossroads is
             generated from the static parameters.
         courses: timed poses: ``(V, 4)`` time [s], x, y [m], heading [rad], by the name of
@@ -167,6 +170,8 @@ def build(
     put(top, "has_road_network", add_road_network(builder, place))
     for participant in story.participants:
         put(top, "has_participant", add_participant(builder, participant, place, driver, ideal))
+    if odd:
+        put(builder.iri(EGO), "has_odd", odd)
     for event in story.events:
         put(top, "has_event", add_event(builder, event, declared, place))
     for name, course in (courses or {}).items():

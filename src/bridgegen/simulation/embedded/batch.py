@@ -124,7 +124,7 @@ class Batch:
         if self._has_addresses:
             return
         self._has_addresses = True
-        drives = DEMANDS.get(self._program.driver.name)
+        drives = DEMANDS.get(self._program.driver.kernel)
         at = here(self.plan, self._roads.tables, self.state, self.record)
         self.plan = addressed(self.plan, drives, at)
 
@@ -337,6 +337,7 @@ class Batch:
             crosswalks=roads.crosswalks[self._rows],
             friction=self.state.weather[:, FRICTION].copy(),
             progress=self._progress(),
+            transitions=self._transitions(),
             corridors=corridors,
             corridor_of=corridor_of,
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
@@ -354,6 +355,10 @@ class Batch:
         corridor_of = np.full(len(self._rows), -1)
         corridor_of[matters] = of
         return self._roads.corridors(networks.tolist()), corridor_of
+
+    def _transitions(self) -> Int:
+        """Return `Rollout.transitions`; no rows where the ego has no operational design domain."""
+        return self.state.transitions - 1 if len(self._program.limits) else NO_TRANSITIONS
 
     def _progress(self) -> Float:
         """Return `Rollout.progress`; no rows where the storyboard moves the ego."""
@@ -373,6 +378,8 @@ NO_DETECTIONS = np.zeros((0, 0, 0, DETECTION))
 NO_PRESENCE = np.zeros((0, 0, 0), dtype=np.bool_)
 
 NO_PROGRESS = np.zeros((0, 2))
+
+NO_TRANSITIONS = np.zeros((0, 2), dtype=np.int64)
 
 NO_LAMPS = np.zeros((0, 0, 0), dtype=np.int8)
 
@@ -412,6 +419,7 @@ def _plan(program: Program, until_collision: bool) -> memory.Plan:
         "comes_and_goes": int(program.comes_and_goes),
         "leaves": int(program.leaves),
         "scene": _scene(program),
+        "stops_in_lane": int(program.driver.stops_in_lane),
         "attends": int(program.attends.size > 0),
         "begins": np.zeros(len(program.actions), dtype=np.int64),
         "follows_courses": 0,

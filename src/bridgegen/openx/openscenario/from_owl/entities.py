@@ -8,7 +8,7 @@ from functools import partial
 from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import EntityBody, entity_body
-from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, SIREN
+from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, ODD, SIREN
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity, quoted_element
 from bridgegen.openx.openscenario.values import Double, format_double
 from bridgegen.scenario.ontology.graph import Individuals
@@ -22,6 +22,7 @@ LIFTED = {
     "has_reason_to_exceed": "exceeds_limit",
     "has_reason_off_crosswalk": "off_crosswalk",
     "has_siren": SIREN,
+    "has_odd": ODD,
 }
 """Names in files of properties of participants' individuals."""
 
@@ -115,7 +116,7 @@ def _body_of_kind(individuals: Individuals, node: Subject, kind: ParticipantKind
 
 
 def _lifted(individuals: Individuals, node: Subject) -> Iterator[osc.Property]:
-    """Yield the properties that say which rules of the traffic are not for a participant."""
+    """Yield the properties that say which rules are not for a participant, and its domain."""
     for key, name in LIFTED.items():
         text = individuals.optional_text(node, key)
         if text is not None:
