@@ -56,7 +56,11 @@ class Watched:
 
     def to_lines(self) -> tuple[str, ...]:
         """Return in words what may be left, and what is not followed."""
-        lines = [f"the ODD is left where the weather does not keep {self.text}"]
+        groups = (
+            " or ".join(f"{x.low:g} <= {x.name} <= {x.high:g}" for x in group)
+            for group in self.limits
+        )
+        lines = [f"the ODD is left where the weather does not keep {', '.join(groups) or '–'}"]
         if self.gaps:
             each = "; ".join(f"{name}: {why}" for name, why in self.gaps.items())
             lines.append(f"of the ODD a drive does not follow: {each}")
