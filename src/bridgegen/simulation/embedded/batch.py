@@ -18,7 +18,7 @@ from bridgegen.drivers._surroundings_kernels import AROUND
 from bridgegen.drivers._tracking_kernels import TRACK
 from bridgegen.drivers._weather_columns import FRICTION, WEATHER
 from bridgegen.drivers.compiled import CONFLICT
-from bridgegen.drivers.drivers import STAGES, STORYBOARD
+from bridgegen.drivers.drivers import DEMAND, STAGES, STORYBOARD
 from bridgegen.drivers.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.drivers.kinds import DETECTION, NEEDS_ROOM
 from bridgegen.drivers.lane_tables import STRAYS
@@ -257,6 +257,11 @@ class Batch:
             stop,
             light,
         )
+
+    def note_demands(self, k: int, demanded: Float) -> None:
+        """Note of which rows ``(N,)`` the driver demands a transition at instant k: not 0."""
+        first = self.state.transitions[:, DEMAND]
+        first[(first == 0) & (demanded != 0.0)] = k + 1
 
     def see_lanes(self, views: Float) -> None:
         """Fill what running rows see of the lanes, ``(N, LANES)``; see ``_lane_view_kernels``."""
