@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from bridgegen.base.errors import ScenarioError
 from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.scenario import LogicalScenario
@@ -136,7 +134,7 @@ class _Followed(States):
             if positive:
                 parts.append(span(low, high))
                 continue
-            sides = [span(-math.inf, np.nextafter(low, -math.inf))] if low > -math.inf else []
-            sides += [span(np.nextafter(high, math.inf), math.inf)] if high < math.inf else []
+            sides = [span(-math.inf, math.nextafter(low, -math.inf))] if low > -math.inf else []
+            sides += [span(math.nextafter(high, math.inf), math.inf)] if high < math.inf else []
             parts.append(("or", tuple(sides)))
         return parts[0] if len(parts) == 1 else ("or" if positive else "and", tuple(parts))
