@@ -211,7 +211,8 @@ def make(spec: str) -> BatchDriver | CompiledDriver:
 def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, ...] | Plans:
     """Return a driver's answer: plans, or arrays ``(N,)``, 0 where a scenario has ended.
 
-    These are its acceleration [m/s²] and curvature [1/m], and what it demands if it says so, 1 or 0.
+    These are its acceleration [m/s²] and curvature [1/m], and, if it says so, 1 where it demands a
+    transition and 0 where it does not.
 
     Args:
         answer: of ``act``.

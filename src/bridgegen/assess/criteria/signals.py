@@ -160,7 +160,9 @@ _STATES = (
 
 _OF_DOMAIN = (
     Signal("outside_odd", "s", "time since the weather left its ODD; 0 before", _since(EXIT)),
-    Signal("demanding", "s", "time since its driver demanded a transition; 0 before", _since(DEMAND)),
+    Signal(
+        "demanding", "s", "time since its driver demanded a transition; 0 before", _since(DEMAND)
+    ),
 )
 
 _PAIRS = (

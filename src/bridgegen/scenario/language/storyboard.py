@@ -399,7 +399,7 @@ class Storyboard:
         if isinstance(time, str):
             what = f"time of {name} [s] must be a constant, got '{time}': steps are events"
             self._report(what, (*path, "time"))
-            time = 0.0
+            time = 1.0
         assert time is not None
         self._check(time, "s", (*path, "time"), above=True)
         changes = [data for _, data in self._events_read if isinstance(data, dict)]

@@ -73,7 +73,8 @@ def watched(scenario: LogicalScenario, *, on_map: bool = False) -> Watched | Non
         on_map: whether it takes place on a map, whose roads are not read.
 
     Raises:
-        ScenarioError: it lies outside from the start, or asks too much of the weather at once.
+        ScenarioError: it lies outside from the start, asks too much of the weather at once, or
+            the scenario's own asks nothing of it.
         FileFormatError: its own ODD is none, or has a unit of another dimension.
     """
     if scenario.odd is None and scenario.domain is None:
@@ -90,6 +91,11 @@ def watched(scenario: LogicalScenario, *, on_map: bool = False) -> Watched | Non
     found = () if tree is True else tuple(clauses_of(tree))
     if not all(isinstance(term, _Span) for clause in found for term in clause):
         raise ScenarioError(f"{scenario.name}: its ODD asks too much of the weather at once")
+    if not found and scenario.odd is None:
+        raise ScenarioError(
+            f"{scenario.name}: nothing of its ODD limits the weather, which alone changes "
+            f"during a drive ({scenario.domain.at(())})"
+        )
     limits = tuple(tuple(term.limit for term in clause) for clause in found)  # type: ignore[attr-defined]
     return Watched(limits, gaps)
 

@@ -32,8 +32,8 @@ from bridgegen.simulation.embedded.compiler.layouts import (
     Body,
     Towing,
     has_siren,
-    limits_of,
     kind,
+    limits_of,
     measures,
     wheelbase,
 )
