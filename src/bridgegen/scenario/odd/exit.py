@@ -77,9 +77,11 @@ def watched(scenario: LogicalScenario, *, on_map: bool = False) -> Watched | Non
             the scenario's own asks nothing of it.
         FileFormatError: its own ODD is none, or has a unit of another dimension.
     """
-    if scenario.odd is None and scenario.domain is None:
-        return None
-    odd: Odd = odd_in(scenario.domain) if scenario.odd is None else scenario.odd.odd
+    own, odd = scenario.domain, scenario.odd.odd if scenario.odd else None
+    if odd is None:
+        if own is None:
+            return None
+        odd = odd_in(own)
     size_of(odd)
     states = states_of(scenario, on_map=on_map)
     followed = _Followed(scenario, states.facts, states.quantities, on_map)
@@ -91,10 +93,10 @@ def watched(scenario: LogicalScenario, *, on_map: bool = False) -> Watched | Non
     found = () if tree is True else tuple(clauses_of(tree))
     if not all(isinstance(term, _Span) for clause in found for term in clause):
         raise ScenarioError(f"{scenario.name}: its ODD asks too much of the weather at once")
-    if not found and scenario.odd is None:
+    if not found and own is not None and scenario.odd is None:
         raise ScenarioError(
             f"{scenario.name}: nothing of its ODD limits the weather, which alone changes "
-            f"during a drive ({scenario.domain.at(())})"
+            f"during a drive ({own.at(())})"
         )
     limits = tuple(tuple(term.limit for term in clause) for clause in found)  # type: ignore[attr-defined]
     return Watched(limits, gaps)
