@@ -5,8 +5,9 @@ the driver demanded that a human takes over; 0: it has not.
 
 The manoeuvre is of the simplest kind: from `PERCEPTION` after the exit the driver demands the
 transition, and drives on as before. Nobody takes over. `TRANSITION` after the demand its hazard
-lights are switched on, and it brakes to a standstill in its lane, where it stays. Its driver steers
-all the time, and brakes harder where it has to. What clears up meanwhile changes nothing.
+lights are switched on, and it brakes to a standstill in the lane that it is on, where it stays. Its
+driver steers all the time, begins no lane change any more, and brakes harder where it has to. What
+clears up meanwhile changes nothing.
 """
 
 # mypy: allow-untyped-defs
@@ -58,10 +59,17 @@ def heed_domain(k, demanded, plan, state):
     since = (k + 1 - state.transitions[EXIT]) * plan.dt
     if state.transitions[DEMAND] == 0 and since >= PERCEPTION - SAME_TIME:
         state.transitions[DEMAND] = k + 1
-    if state.transitions[DEMAND] == 0:
-        return demanded
-    since = (k + 1 - state.transitions[DEMAND]) * plan.dt - TRANSITION
-    if since < -SAME_TIME:
+    lasts = stopping_for(k, plan, state)
+    if lasts < 0.0:
         return demanded
     state.switched[0] |= HAZARD
-    return min(demanded, -min(JERK * max(since, 0.0), COMFORT_DECELERATION))
+    return min(demanded, -min(JERK * lasts, COMFORT_DECELERATION))
+
+
+@kernel
+def stopping_for(k, plan, state):
+    """Return for how long [s] the manoeuvre has lasted at instant k; below 0: it has not begun."""
+    if plan.stops_in_lane == 0 or state.transitions[DEMAND] == 0:
+        return -1.0
+    since = (k + 1 - state.transitions[DEMAND]) * plan.dt - TRANSITION
+    return since if since < -SAME_TIME else max(since, 0.0)
