@@ -75,6 +75,7 @@ def schema() -> dict[str, Any]:
             "control",
             acceleration=_numbers("(N,)", "demanded, forward [m/s²]"),
             curvature=_numbers("(N,)", "of the rear axle's path [1/m], left is positive"),
+            demand=_numbers("(N,)", "not 0: it demands that a human takes over; may be left out"),
         ),
         "trajectory": _message(
             "trajectory",
@@ -93,6 +94,7 @@ def schema() -> dict[str, Any]:
             },
         ),
     }
+    answers["control"]["required"] = ["type", "acceleration", "curvature"]
     answers["hello"]["required"] = ["type", "protocol", "name"]
     answers["error"]["required"] = ["type", "message"]
     requests = {

@@ -23,6 +23,7 @@ from bridgegen.drivers._following_kernels import (
 from bridgegen.drivers._ghost_kernels import haunt
 from bridgegen.drivers._lane_change_kernels import LAST, change_lane, look_back, shift_of
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
+from bridgegen.drivers._odd_kernels import stopping_for
 from bridgegen.drivers._path_kernels import UNSHIFTED, pursue_beside, shift_speed
 from bridgegen.drivers._perception_kernels import perceive
 from bridgegen.drivers._prediction_kernels import predict, predict_truly
@@ -63,7 +64,7 @@ def reach_of(v):
 @kernel
 def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_limit, seen,
          light_seen, in_town, around, tracks, passages, n_passages, crosswalks, stop_stations,
-         halts, lights, elapsed, mind):  # fmt: skip
+         halts, lights, elapsed, keeps_lane, mind):  # fmt: skip
     """Return the acceleration [m/s²] that the planner wants.
 
     Args:
@@ -91,6 +92,7 @@ def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_l
         halts: stations of the lines of stop signs [m].
         lights: their states.
         elapsed: since the last plan [s].
+        keeps_lane: whether it changes lanes no more.
         mind: see above.
     """
     front, rear, half_width = body[2] + 0.5 * body[0], 0.5 * body[0] - body[2], 0.5 * body[1]
@@ -103,7 +105,7 @@ def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_l
     else:
         speed = min(speed, limit_speed(road, drops, road_n, ds, s, v))
     asked = math.inf
-    if road_n > 0:
+    if road_n > 0 and not keeps_lane:
         asked = change_lane(
             road, road_n, ds, s, v, speed, front, rear, half_width, around, tracks, passages,
             n_passages, crosswalks, stop_stations, seen, friction_limit, elapsed, mind,
@@ -190,7 +192,7 @@ def drive(k, plan_, roads, state, record):
             path, roads.bends[p], roads.road, roads.drops, n, road_n, ds, s, v, body,
             state.command[0], friction_limit, seen, light_seen, in_town, state.around,
             state.tracks, state.passages, count, roads.crosswalks, roads.stops, roads.halts,
-            state.lights, elapsed, mind,
+            state.lights, elapsed, stopping_for(k, plan_, state) >= 0.0, mind,
         )  # fmt: skip
     if shift_of(mind) != UNSHIFTED and state.on[0] == 0:
         curvature = pursue_beside(

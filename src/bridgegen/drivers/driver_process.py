@@ -120,8 +120,8 @@ class DriverProcess:
 
     def act(
         self, observation: Observation, views: Views | None = None
-    ) -> tuple[Float, Float] | Plans:
-        """Return its control, ``(N,)`` acceleration [m/s²] and curvature [1/m], or its plans.
+    ) -> tuple[Float, ...] | Plans:
+        """Return its control or its plans, see `checked`.
 
         Args:
             observation: without what the driver wants.
@@ -133,7 +133,7 @@ class DriverProcess:
                 `checked_plans` refuses.
         """
         self.asked_at, start = observation.time, time.perf_counter()
-        answer: tuple[Float, Float] | Plans = self._process.ask(
+        answer: tuple[Float, ...] | Plans = self._process.ask(
             "act", observation, views or {}, seconds=self.time_limit
         )
         self.call_seconds.append(time.perf_counter() - start)
@@ -208,8 +208,11 @@ def make(spec: str) -> BatchDriver | CompiledDriver:
     return driver
 
 
-def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, Float] | Plans:
-    """Return a driver's answer: plans, or two arrays ``(N,)``, 0 where a scenario has ended.
+def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, ...] | Plans:
+    """Return a driver's answer: plans, or arrays ``(N,)``, 0 where a scenario has ended.
+
+    These are its acceleration [m/s²] and curvature [1/m], and, if it says so, 1 where it demands a
+    transition and 0 where it does not.
 
     Args:
         answer: of ``act``.
@@ -229,10 +232,12 @@ def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, Float
     try:
         acceleration, curvature = pair
         arrays = [np.asarray(buffer, dtype=np.float64) for buffer in (acceleration, curvature)]
+        if isinstance(answer, Control) and answer.demand is not None:
+            arrays.append(np.asarray(answer.demand, dtype=np.bool_).astype(np.float64))
     except (TypeError, ValueError) as error:
         text = f"act must return a Control, (acceleration, curvature) or a Trajectory: {error}"
         raise DriverError("answered nonsense", text) from None
-    for what, array in zip(("acceleration", "curvature"), arrays, strict=True):
+    for what, array in zip(("acceleration", "curvature", "demand"), arrays, strict=False):
         if array.shape != running.shape:
             raise DriverError(
                 "answered nonsense",
@@ -241,7 +246,7 @@ def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, Float
         bad = running & ~np.isfinite(array)
         if bad.any():
             raise DriverError("answered nonsense", f"{what} must be finite, got {array[bad][0]}")
-    return np.where(running, arrays[0], 0.0), np.where(running, arrays[1], 0.0)
+    return tuple(np.where(running, array, 0.0) for array in arrays)
 
 
 def answering(spec: str) -> tuple[Traits, Answer]:

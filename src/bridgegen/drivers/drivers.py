@@ -38,6 +38,12 @@ class Origin(Enum):
     """A simulator other than the embedded one."""
 
 
+EXIT, DEMAND = 0, 1
+"""Columns of ``Rollout.transitions``."""
+
+STOP_IN_LANE = "+stop-in-lane"
+"""End of the name of a driver with a minimal-risk manoeuvre, see ``_odd_kernels``."""
+
 TIME_LIMIT = 10.0
 """Default time limit of one call of a user's driver [s]."""
 
@@ -76,6 +82,7 @@ class Driver:
         domain: where it means to drive: words of `bridgegen.drivers.planners.DOMAINS`;
             empty: it does not say.
         called: what the user calls it (``--name``); empty: as its name says.
+        stops_in_lane: whether it stops where its operational design domain is left.
     """
 
     name: str
@@ -88,6 +95,12 @@ class Driver:
     spec: str = ""
     domain: frozenset[str] = frozenset()
     called: str = field(default="", compare=False)
+    stops_in_lane: bool = False
+
+    @property
+    def kernel(self) -> str:
+        """The name of the driver that ships whose kernel drives."""
+        return self.name.removesuffix(STOP_IN_LANE)
 
     @property
     def is_own(self) -> bool:
@@ -206,6 +219,7 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         name: of one that ships, of a planner, or a user's own: ``package.module:Class``,
             ``file.py:Class`` (or a compiled driver's function), ``file.fmu``; or where it runs,
             as ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``. It is loaded when it drives.
+            One that ships may end in `STOP_IN_LANE`.
         ideal: stages to idealise.
         time_limit: [s] that one call of a user's own driver may take.
 
@@ -222,6 +236,11 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         )
     if name in known:
         return known[name].idealised(ideal)
+    if name.removesuffix(STOP_IN_LANE) in DRIVERS:
+        driver = DRIVERS[name.removesuffix(STOP_IN_LANE)]
+        what = f"{driver.description} Outside its ODD it stops in its lane."
+        driver = replace(driver, name=name, description=what, stops_in_lane=True)
+        return driver.idealised(ideal)
     if is_remote(name):
         address_of(name)
     spec, what, domain = name, "A driver of the user's own.", frozenset[str]()

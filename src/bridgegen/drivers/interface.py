@@ -112,6 +112,9 @@ class Observation:
         stop_distance: ``(N,)`` float64 [m], from the front of the ego to the next stop line of a
             light on its route; +inf where there is none.
         light: ``(N,)`` int8, that light's state, see `Rollout.lights`; 0 where there is none.
+        weather: ``(N, 8)`` float64, the weather as it is: visual range [m], rain and snow [mm/h of
+            water], the sun's azimuth and elevation [rad], its illuminance on the ground [lx] (< 0:
+            as the sun stands), clouds' share of the sky, friction as a share of that of a dry road.
         lanes: along the route, if the driver wants "lanes".
         map: what of the road network is near, if it wants "map".
         conflicts: where others' ways meet the route, if it wants "conflicts".
@@ -132,6 +135,7 @@ class Observation:
     tracks: Float
     stop_distance: Float
     light: npt.NDArray[np.int8]
+    weather: Float | None = None
     lanes: "Lanes | None" = None
     map: "MapView | None" = None
     conflicts: "Conflicts | None" = None
@@ -268,10 +272,13 @@ class Control:
     Attributes:
         acceleration: ``(N,)`` [m/s²], forward; braking is negative.
         curvature: ``(N,)`` [1/m], of the path of the rear axle's centre; left is positive.
+        demand: ``(N,)`` bool, whether the driver demands that a human takes over; nobody does. The
+            first such instant counts, see `Rollout.transitions`. None: it does not.
     """
 
     acceleration: npt.ArrayLike
     curvature: npt.ArrayLike
+    demand: npt.ArrayLike | None = None
 
 
 class BatchDriver(Protocol):

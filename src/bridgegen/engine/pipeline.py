@@ -148,6 +148,7 @@ class Pipeline:
             held,
             embedded.duration,
             named,
+            has_odd=len(embedded.program.limits) > 0,
         )
         named_metrics = measures.read(options.metrics)
         if recorded is None:

@@ -168,6 +168,7 @@ def simulate_file(
         held,
         embedded.duration,
         f"the driver '{embedded.driver}'",
+        has_odd=len(embedded.program.limits) > 0,
     )
     network = embedded.roads([roads])
     # Ways are planned once: another simulator's roads are files besides.

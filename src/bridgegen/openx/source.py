@@ -21,6 +21,7 @@ from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
 from bridgegen.scenario.language.story import Participant
 from bridgegen.scenario.named_models import MODELS, type_of
+from bridgegen.scenario.odd.exit import watched
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.individuals import build, build_static
 from bridgegen.scenario.ontology.site import Site
@@ -143,6 +144,8 @@ class OntologySource:
         ideal: str = "",
     ) -> None:
         self.constraints = self._scenario = scenario
+        odd = watched(scenario, on_map=road_map is not None)
+        self._odd = odd.text if odd else ""
         self._driver, self._ideal, self._map = driver, ideal, road_map
         static = tuple(
             name for name, parameter in scenario.parameters.items() if parameter.axis is Axis.STATIC
@@ -240,6 +243,7 @@ class OntologySource:
             values,
             driver=self._driver,
             ideal=self._ideal,
+            odd=self._odd,
             site=site,
             courses=courses,
         )

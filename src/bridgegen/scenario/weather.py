@@ -20,6 +20,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from bridgegen.base import elementary
+from bridgegen.base.errors import InputError, UnknownNameError
 
 # -- laws ------------------------------------------------------------------------------------------
 
@@ -256,6 +257,63 @@ STATED_BY: Mapping[str, Parameter] = MappingProxyType(
     {parameter.stands_for: parameter for parameter in _PARAMETERS if parameter.stands_for}
 )
 """Weather parameters by the physical quantity that they stand for."""
+
+# -- limits ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Limit:
+    """An interval of a physical quantity.
+
+    Attributes:
+        name: of a physical quantity that is simulated.
+        low: its least value, in its unit.
+        high: its greatest.
+    """
+
+    name: str
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        """Return it as a file states it; `read_limits` reads the same bits again."""
+        return f"{self.low!r} <= {self.name} <= {self.high!r}"
+
+
+Limits = tuple[tuple[Limit, ...], ...]
+"""What a weather keeps: of each group one limit at least."""
+
+
+def limits_text(limits: Limits) -> str:
+    """Return limits as a file states them."""
+    return "; ".join(" or ".join(map(str, group)) for group in limits)
+
+
+def read_limits(text: str) -> Limits:
+    """Return the limits that a file states.
+
+    Raises:
+        InputError: it is no list of limits, or names what is not simulated.
+    """
+    names = [column.name for column in COLUMNS]
+    try:
+        found = tuple(
+            tuple(
+                Limit(name.strip(), float(low), float(high))
+                for low, name, high in (limit.split("<=") for limit in group.split(" or "))
+            )
+            for group in text.split(";")
+        )
+        # A comparison with NaN does not hold either.
+        if not all(limit.low <= limit.high for group in found for limit in group):
+            raise ValueError
+    except ValueError:
+        raise InputError(f"limits read '0.0 <= rain <= 5.0; …', got '{text[:80]}'") from None
+    for limit in (limit for group in found for limit in group):
+        if limit.name not in names:
+            raise UnknownNameError("quantity of the weather", limit.name, names)
+    return found
+
 
 # -- CARLA -----------------------------------------------------------------------------------------
 

@@ -113,6 +113,9 @@ class Rollout:
             are no trailers. Coupled entities do not collide.
         progress: ``(N, 2)`` float64 [m], how far the ego's driver drove, and how far it then was
             from the end of its route; ``(0, 2)`` where unknown.
+        transitions: ``(N, 2)`` int64, the instants at which the weather left the ego's operational
+            design domain, and at which its driver demanded that a human takes over; -1: never.
+            ``(0, 2)`` where the ego states no such domain.
         corridors: ``(P, L, 8)`` float64, the room beside the ego's route on each road network, at
             every sample of it, see `bridgegen.drivers.lane_tables.corridor_along`; +inf beyond its
             end.
@@ -152,6 +155,7 @@ class Rollout:
     friction: Float = field(default_factory=lambda: np.zeros(0))
     towed_by: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     progress: Float = field(default_factory=lambda: np.zeros((0, 2)))
+    transitions: Int = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     corridors: Float = field(default_factory=lambda: np.zeros((0, 0, 8)))
     corridor_of: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     messages: Mapping[int, str] = field(default_factory=dict)
@@ -228,7 +232,7 @@ class Rollout:
 _BY_ROW = (
     "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",
     "ghosts", "stop_lines", "present", "lamps", "claims", "crosswalks", "friction", "progress",
-    "corridor_of",
+    "transitions", "corridor_of",
 )  # fmt: skip
 
 _BY_INSTANT = (

@@ -19,6 +19,7 @@ from pydantic import BaseModel
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.units import percent
+from bridgegen.drivers.drivers import DEMAND
 from bridgegen.drivers.kinds import IS_OBSTACLE, IS_ON_FOOT
 from bridgegen.simulation.rollout import Rollout
 
@@ -166,7 +167,8 @@ def stuck(rollout: Rollout) -> tuple[Int, Int]:
     nearer and could be at the ego within `GAP_TIME`; and what stands in the way just ahead, unless
     it is a vehicle or an object that never moves and has no other standing just ahead of it, as in
     a jam: that one is parked, and is to be passed. An ego that does not move at all, until its
-    first contact or the end, is stuck whatever the reason.
+    first contact or the end, is stuck whatever the reason; but none is whose driver has demanded a
+    transition.
 
     Args:
         rollout: of N scenarios, with ``progress``.
@@ -185,7 +187,10 @@ def stuck(rollout: Rollout) -> tuple[Int, Int]:
     counts = np.arange(rollout.shape[2]) <= _last_judged(rollout)[:, np.newaxis]
     never_moves = ~(counts & (np.abs(rollout.v[:, 0]) >= STANDS)).any(axis=1)
     never_moves &= (rollout.status == 0) & (rollout.progress[:, 1] > 0.0)
-    rows = np.flatnonzero(waits | never_moves)
+    stands = waits | never_moves
+    if len(rollout.transitions):  # it stops because it has left its domain
+        stands &= rollout.transitions[:, DEMAND] < 0
+    rows = np.flatnonzero(stands)
     if not rows.size:
         return rows, rows
     some, idle, there, last = _sampled(rollout, rows, every), idle[rows], there[rows], last[rows]

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from bridgegen.assess.conflict import quantities
-from bridgegen.assess.criteria.signals import SIGNALS, read
+from bridgegen.assess.criteria.signals import OF_DOMAIN, SIGNALS, read
 from bridgegen.assess.metrics import Need
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import BridgeGenError, InputError
@@ -70,6 +70,7 @@ class Monitor:
         held: Collection[Need],
         duration: float,
         source: str,
+        has_odd: bool = False,
     ) -> None:
         """Check criteria.
 
@@ -79,13 +80,14 @@ class Monitor:
             held: what the rollouts hold besides motion; see `bridgegen.assess.metrics.require`.
             duration: the longest that a scenario lasts [s].
             source: of the rollouts, for messages.
+            has_odd: whether the ego has an operational design domain that a drive can leave.
 
         Raises:
             InputError: a signal, entity or metric is unknown, units do not agree, or a formula
                 looks beyond the end; all problems at once.
         """
         self.criteria = tuple(criteria)
-        self._entities = tuple(entities)
+        self._entities, self._has_odd = tuple(entities), has_odd
         problems, metrics = list[str](), list[str]()
         for criterion in criteria:
             wrong = self._problems(criterion, duration)
@@ -177,6 +179,7 @@ class Monitor:
             ]
         pair = len(reading.of) > 1
         known = [name for name, signal in SIGNALS.items() if signal.pair == pair]
+        known_as = self._entities[0] if self._entities else "ego"
         problems = []
         if reading.name not in known:
             form = (
@@ -186,6 +189,11 @@ class Monitor:
             hint = _near(reading.name, known) or f"; known: {names}"
             problems.append(f"unknown signal '{form}'{hint}{where}")
         entity = reading.of[-1]
+        if reading.name in OF_DOMAIN and not (self._has_odd and entity in ("ego", known_as)):
+            problems.append(
+                f"'{entity}.{reading.name}' needs an ego whose ODD limits the weather (odd: or "
+                f"--odd){where}"
+            )
         others = (ANY, *self._entities[1:]) if pair else ("ego", *self._entities)
         if entity not in others:
             kind = "other participant" if pair else "participant"

@@ -8,6 +8,7 @@ import numpy as np
 
 from bridgegen.assess.metrics.metric import motion, shared
 from bridgegen.base.arrays import Bool, Float
+from bridgegen.drivers.drivers import DEMAND, EXIT
 from bridgegen.scenario.language.criteria import ANY
 from bridgegen.simulation.rollout import Rollout
 
@@ -90,6 +91,21 @@ def _gap(rollout: Rollout, e: int) -> Float:
     return np.asarray(rollout.distance[:, e])
 
 
+def _since(which: int) -> Callable[[Rollout, int], Float]:
+    """Return how the time since a transition of the ego's is computed."""
+
+    def compute(rollout: Rollout, e: int) -> Float:
+        del e
+        n, _, t = rollout.shape
+        if not len(rollout.transitions):
+            return np.zeros((n, t))
+        at = rollout.transitions[:, which, np.newaxis]
+        passed = (np.arange(t) - at) * rollout.time_step
+        return np.where((at >= 0) & (passed > 0.0), passed, 0.0)
+
+    return compute
+
+
 # The kernels return the least value over a scenario's time: scenarios of one instant each give the
 # value at every instant.
 def _by_instant(of: Float, e: int) -> Float:
@@ -142,6 +158,13 @@ _STATES = (
     Signal("travelled", "m", "distance travelled since the start", _travelled),
 )
 
+_OF_DOMAIN = (
+    Signal("outside_odd", "s", "time since the weather left its ODD; 0 before", _since(EXIT)),
+    Signal(
+        "demanding", "s", "time since its driver demanded a transition; 0 before", _since(DEMAND)
+    ),
+)
+
 _PAIRS = (
     Signal("gap", "m", "distance of the bodies, 0 in contact; inf from who is absent", _gap, True),
     Signal("ttc", "s", "time to collision at constant velocities; else inf", _ttc, True),
@@ -149,9 +172,12 @@ _PAIRS = (
 )
 
 SIGNALS: Mapping[str, Signal] = MappingProxyType(
-    {state.name: state for state in (*_STATES, *_PAIRS)}
+    {state.name: state for state in (*_STATES, *_OF_DOMAIN, *_PAIRS)}
 )
 """All signals by name."""
+
+OF_DOMAIN = tuple(signal.name for signal in _OF_DOMAIN)
+"""Names of those of an ego with an operational design domain."""
 
 
 def read(rollout: Rollout, name: str, of: tuple[str, ...]) -> Float:

@@ -38,7 +38,7 @@ MAX_JSON, MAX_JSON_LISTS = 16 * 2**20, 100_000
 """Largest size of an answer in JSON [bytes], and most lists and maps in it: while it is read, each
 number of two bytes is an object of 40, and each list of 60."""
 
-NUMBERS = frozenset(("acceleration", "curvature", "time", "x", "y", "h", "v"))
+NUMBERS = frozenset(("acceleration", "curvature", "demand", "time", "x", "y", "h", "v"))
 """Keys of an answer in JSON whose lists are arrays."""
 
 NOT_FINITE = {"Infinity": math.inf, "-Infinity": -math.inf, "NaN": math.nan}

@@ -256,7 +256,8 @@ def _control(answer: Message) -> Control | Trajectory:
         raise ProtocolError(
             f"the answer must be of type 'control' or 'trajectory', got {_short(answer['type'])}"
         )
-    return Control(_array(answer, "acceleration"), _array(answer, "curvature"))
+    demand = _array(answer, "demand") if answer.get("demand") is not None else None
+    return Control(_array(answer, "acceleration"), _array(answer, "curvature"), demand)
 
 
 def _array(answer: Message, name: str) -> Any:

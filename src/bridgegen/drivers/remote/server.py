@@ -165,7 +165,9 @@ def _control(answer: Any) -> messages.Message:
     except (TypeError, ValueError) as error:
         text = f"act must return a Control or (acceleration, curvature): {error}"
         raise messages.ProtocolError(text) from None
-    return {"type": "control", "acceleration": acceleration, "curvature": curvature}
+    found = {"type": "control", "acceleration": acceleration, "curvature": curvature}
+    demand = getattr(answer, "demand", None)
+    return found if demand is None else {**found, "demand": _floats(demand)}
 
 
 def _floats(values: Any) -> Any:

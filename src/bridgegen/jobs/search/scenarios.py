@@ -25,6 +25,7 @@ from bridgegen.scenario.language.scenario import (
     SearchedScenario,
     Term,
 )
+from bridgegen.scenario.odd.exit import watched
 from bridgegen.search.algorithms import Algorithm
 from bridgegen.simulation.embedded.compiler import compile_storyboard
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
@@ -66,7 +67,9 @@ def load(
             f"a distribution is for the parameters of an OpenSCENARIO file ({STORYBOARD}), got "
             f"{scenario}"
         )
-    return reader.load(scenario)
+    logical = reader.load(scenario)
+    odd = watched(logical)
+    return replace(logical, notes=(*logical.notes, *odd.to_lines())) if odd else logical
 
 
 def margins_of(scenario: str | Path, options: CommonOptions) -> tuple[str, ...]:

@@ -52,6 +52,10 @@ KIND = "participant_kind"
 SIREN = "siren"
 """Property of a vehicle: "on" of an emergency vehicle with blue light and siren."""
 
+ODD = "odd"
+"""Property of the ego: limits of the weather in its operational design domain, see
+`bridgegen.scenario.weather.read_limits`."""
+
 DRIVER = "driver"
 """Property of a controller: the driver's name."""
 

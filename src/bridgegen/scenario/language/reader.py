@@ -456,12 +456,13 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     problems += wrong
     recorded, wrong = read_recorded(document, parameters, derived)
     problems += wrong
-    declarations.derived += changes.derived
-    derived |= {item.name: item for item in changes.derived}
+    more = [*changes.derived, *board.derived]
+    declarations.derived += more
+    derived |= {item.name: item for item in more}
     between = bounds_between_layers(roads, story, parameters, declarations.prefixes, document.place)
     if not quantities.problems:
         declarations.bounds += between
-    used = quantities.used | roads.parameters | {item.name for item in changes.derived}
+    used = quantities.used | roads.parameters | {item.name for item in more}
     used |= {prefix + name for prefix in story.later_weathers for name in NEEDED}
     if problems or quantities.problems:  # a section that cannot be read uses what it names
         used |= _texts([document.data.get(key) for key in _USING])
@@ -498,6 +499,7 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
         matrix=matrix,
         clauses=clauses,
         recorded=recorded,
+        domain=document.below("odd") if given.odd else None,
         exposure=document.below("exposure") if given.exposure is not None else None,
     )
     try_out(scenario)

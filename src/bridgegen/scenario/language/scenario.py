@@ -221,6 +221,8 @@ class LogicalScenario(SearchedScenario):
         matrix: values that are tested of it, by edition.
         recorded: the recorded events that are this scenario; no part of its fingerprint, because
             it does not change what is simulated.
+        domain: the file's block ``odd``, the ego's operational design domain; see
+            `bridgegen.scenario.odd.exit`.
         exposure: the file's block of that name, which no search depends on; see
             `bridgegen.scenario.exposure`.
     """
@@ -236,6 +238,7 @@ class LogicalScenario(SearchedScenario):
     adversary: Adversary | None = field(default=None, repr=False, kw_only=True)
     matrix: "tuple[Grid, ...]" = field(default=(), repr=False, kw_only=True)
     recorded: "RecordedSpec | None" = field(default=None, repr=False, kw_only=True)
+    domain: "Document | None" = field(default=None, compare=False, repr=False, kw_only=True)
     exposure: "Document | None" = field(default=None, compare=False, repr=False, kw_only=True)
 
     @property
@@ -303,6 +306,7 @@ class LogicalScenario(SearchedScenario):
             self.criteria,
             self.clauses,
             self.matrix,
+            self.domain.data if self.domain else None,
         )
         more = "".join(repr(part) for part in parts if part)
         return sha256((content + more).encode()).hexdigest()

@@ -5,7 +5,7 @@ The texts under the keys are what editors and the documentation show
 becomes (``parameters``, ``story``, …).
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -302,6 +302,10 @@ class ScenarioFile(ShapedSection):
     """Quantities that follow from parameters, by name."""
     criteria: list[CriterionSection] = []
     """Pass criteria: formulas that must hold, each with an id."""
+    odd: dict[
+        Literal["INCLUDE_AND", "INCLUDE_OR", "EXCLUDE_AND", "EXCLUDE_OR"], dict[str, Any]
+    ] = {}
+    """Operational design domain of the ego, in sections of an OpenODD module: see docs/odd.md."""
     matrix: list[GridSection] = []
     """Values to test instead of a sample of the ranges: what 'bridgegen suite' runs."""
     clauses: list[ClauseSection] = []

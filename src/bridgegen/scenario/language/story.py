@@ -277,9 +277,11 @@ class WeatherChange:
 
     Attributes:
         prefix: those are named so, and then as the weather's own (``later_fog_density``).
+        is_whole: whether they state all of the weather; else the rest stays as it was.
     """
 
     prefix: str
+    is_whole: bool = field(default=True, repr=False)
 
     def __str__(self) -> str:
         """Return what happens to the weather, to be said after it."""
@@ -427,10 +429,14 @@ class Story:
 
     @property
     def later_weathers(self) -> tuple[str, ...]:
-        """The prefixes of the weathers that events change to."""
-        actions = (action for event in self.events for action in event.actions)
-        found = (change.prefix for change in actions if isinstance(change, WeatherChange))
-        return tuple(dict.fromkeys(found))
+        """The prefixes of the whole weathers that events change to."""
+        changes = (
+            action
+            for event in self.events
+            for action in event.actions
+            if isinstance(action, WeatherChange) and action.is_whole
+        )
+        return tuple(dict.fromkeys(change.prefix for change in changes))
 
 
 @dataclass(frozen=True)

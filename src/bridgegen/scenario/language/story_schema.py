@@ -230,7 +230,7 @@ class EventSection(ShapedSection):
     jerk: Number | None = None
     """Rate at which the acceleration, up to ``rate``, builds up and is released [m/s³]."""
     time: Duration | None = None
-    """Duration of the speed change [s]."""
+    """Duration of the speed change, or of that of the weather, then a constant [s]."""
     distance: Length | None = None
     """Distance covered during the speed change [m]."""
     shape: Literal["linear", "cubic", "sinusoidal"] = "linear"

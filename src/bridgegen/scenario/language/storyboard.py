@@ -1,5 +1,6 @@
 """Participants and events of a scenario file: built, with the rules they must keep."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -44,6 +45,7 @@ from bridgegen.scenario.language.story_schema import (
 )
 from bridgegen.scenario.named_models import MODELS, body_of
 from bridgegen.scenario.participants import PARTICIPANTS, TYPES, Body
+from bridgegen.scenario.weather import PARAMETERS
 
 EGO = "ego"
 
@@ -52,6 +54,9 @@ MOST_ASIDE = 4.0
 
 FASTEST_REVERSE = -5.0
 """Fastest speed in reverse [m/s]; 18 km/h is about what a reverse gear does."""
+
+WEATHER_STEPS = 5
+"""Steps of a weather that changes over a time."""
 
 _OF_EVENTS = ("after", "began")
 
@@ -71,6 +76,7 @@ class Storyboard:
         events: likewise.
         ghosts: likewise.
         known: the participants' names, also of those that are described wrongly.
+        derived: the weathers between, where one changes over a time.
 
     Args:
         quantities: of the file; collects problems.
@@ -93,6 +99,7 @@ class Storyboard:
         self.known = [str(name) for name, _ in entries(document, "participants")] + list(more)
         self._events_read = list(entries(document, "events"))
         self._event_names = [str(name) for name, _ in self._events_read]
+        self.derived: list[Derived] = []
         self.participants = tuple(self._participants())
         self._acting = {participant.name: participant for participant in self.participants}
         self.events = tuple(self._events())
@@ -392,20 +399,76 @@ class Storyboard:
                 tuple(self._conditions(given, condition_section, (*path, "when", number)))
                 for number, condition_section in enumerate(given.when)
             )
+            if given.weather is not None and given.time is not None:
+                yield from self._weather_in_steps(name, given, when, path)
+                continue
             yield EventSpec(name, given.participant, actions, when)
+
+    def _weather_names(self, prefix: str) -> list[str]:
+        """Return the parameters of the weather that are declared with a prefix."""
+        return [name for name in PARAMETERS if prefix + name in self._quantities.declared]
+
+    def _weather_in_steps(
+        self,
+        name: str,
+        given: EventSection,
+        when: tuple[tuple[ConditionSpec, ...], ...],
+        path: Path,
+    ) -> Iterator[EventSpec]:
+        """Yield the events of a weather that changes over a time, in `WEATHER_STEPS` equal steps.
+
+        OpenSCENARIO has no weather that changes steadily.
+        """
+        prefix, time = str(given.weather), given.time
+        if isinstance(time, str):
+            what = f"time of {name} [s] must be a constant, got '{time}': steps are events"
+            self._report(what, (*path, "time"))
+            time = 1.0
+        assert time is not None
+        self._check(time, "s", (*path, "time"), above=True)
+        changes = [data for _, data in self._events_read if isinstance(data, dict)]
+        if sum("weather" in data for data in changes) > 1:
+            what = f"{name} changes the weather over a time, which begins with that of the start"
+            self._report(f"{what}: no other event may change it", path)
+        place = self._quantities.document.at(path)
+        for step in range(1, WEATHER_STEPS + 1):
+            share, between = step / WEATHER_STEPS, f"{prefix}{step}_"
+            if step == WEATHER_STEPS:
+                between = prefix
+            for each in self._weather_names(prefix) if step < WEATHER_STEPS else ():
+                unit, to = PARAMETERS[each].unit, f"{prefix}{each}"
+                value = parse(f"{each} + {share!r}*({to} - {each})", place)
+                why = "The weather changes step by step."
+                said = f"{each} after step {step} of {WEATHER_STEPS} of {name}."
+                self.derived.append(
+                    Derived(between + each, Axis.WEATHER, unit, value, why, "ours", said, place)
+                )
+            change = WeatherChange(between, step == WEATHER_STEPS and prefix in self._prefixes)
+            if step == 1:
+                yield EventSpec(name, None, (change,), when)
+            else:
+                after = time * (step - 1) / (WEATHER_STEPS - 1)
+                began = ConditionSpec("began", after, event=name)
+                yield EventSpec(f"{name}_{step}", None, (change,), ((began,),))
 
     def _actions(self, name: str, given: EventSection, path: Path) -> Iterator[Action]:
         if given.weather is not None:
-            if given.weather not in self._prefixes:
+            is_whole = given.weather in self._prefixes
+            names = self._weather_names(given.weather)
+            if not names:
                 known = ", ".join(self._prefixes) or "none"
                 self._report(
                     f"{name} changes the weather to one that is included with a prefix "
-                    f"('weather as {given.weather}'); there are: {known}",
+                    f"('weather as {given.weather}'), or to parameters of such names "
+                    f"({given.weather}fog_density); there are: {known}",
                     path,
                 )
+            for each in names if not is_whole else ():
+                unit, low = PARAMETERS[each].unit, -math.inf
+                self._check(f"{given.weather}{each}", unit, (*path, "weather"), low=low)
             if given.participant is not None:
                 self._report(f"{name}: the weather has no participant", path)
-            yield WeatherChange(given.weather)
+            yield WeatherChange(given.weather, is_whole)
         elif given.participant is None:
             self._report(f"{name} must have a participant", path)
         if given.speed is not None:
@@ -419,7 +482,9 @@ class Storyboard:
             change = self._change(given.rate, given.time, given.distance, given.shape, path)
             yield SpeedChange(given.speed, replace(change, jerk=given.jerk))
         elif any(
-            value is not None for value in (given.rate, given.jerk, given.time, given.distance)
+            value is not None
+            for value in (given.rate, given.jerk, given.distance)
+            + ((given.time,) if given.weather is None else ())
         ):
             self._report(f"{name} has a change of speed without its target (speed)", path)
         if given.lane_change is not None:

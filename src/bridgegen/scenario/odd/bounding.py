@@ -90,12 +90,12 @@ class Fit:
             gaps: dict[str, str] = {}
             condition = Condition(name, literal, (literal,))
             # Not as excluded: of several participants each one counts that is of the literal.
-            tree = _tree(condition, False, self.odd, self.states, gaps, [])
+            tree = tree_of(condition, False, self.odd, self.states, gaps, [])
             if gaps:
                 continue
             met = np.full(n, tree is not True)
             if not isinstance(tree, bool):
-                met = ~np.logical_and.reduce([_met(each, columns, n) for each in _clauses(tree)])
+                met = ~np.logical_and.reduce([_met(each, columns, n) for each in clauses_of(tree)])
             found[literal] = met
         return found
 
@@ -163,13 +163,13 @@ def fit_of(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> Fit:
     """
     size_of(odd)
     states, gaps, refused = states_of(scenario, on_map=on_map), dict[str, str](), list[str]()
-    tree = _tree(odd.formula, True, odd, states, gaps, refused)
+    tree = tree_of(odd.formula, True, odd, states, gaps, refused)
     if tree is False:
         return Fit(odd, states, ((),), gaps=gaps, refused=tuple(refused))
-    return Fit(odd, states, () if tree is True else tuple(_clauses(tree)), gaps=gaps)
+    return Fit(odd, states, () if tree is True else tuple(clauses_of(tree)), gaps=gaps)
 
 
-def _tree(
+def tree_of(
     formula: "Condition | Group",
     positive: bool,
     odd: Odd,
@@ -184,7 +184,7 @@ def _tree(
     if isinstance(formula, Condition):
         meant = resolved(formula, odd)
         if isinstance(meant, Group):
-            return _tree(meant, positive, odd, states, gaps, refused)
+            return tree_of(meant, positive, odd, states, gaps, refused)
         found = states.holds(meant, positive, odd)
         if isinstance(found, str):
             gaps[formula.name] = found
@@ -193,10 +193,10 @@ def _tree(
             refused.append(_contradiction(formula, positive, states))
         return found
     if formula.sign == "not":
-        return _tree(formula.parts[0], not positive, odd, states, gaps, refused)
+        return tree_of(formula.parts[0], not positive, odd, states, gaps, refused)
     is_and = (formula.sign == "and") == positive
     own: list[str] = []
-    parts = [_tree(part, positive, odd, states, gaps, own) for part in formula.parts]
+    parts = [tree_of(part, positive, odd, states, gaps, own) for part in formula.parts]
     if (not is_and) in parts:
         refused += own if is_and else []
         return not is_and
@@ -220,7 +220,7 @@ def _contradiction(condition: Condition, positive: bool, states: States) -> str:
     return f"it {asks} {condition.name}, {states.scenario.name} has {has}"
 
 
-def _clauses(tree: Any) -> Iterator[tuple[Term, ...]]:
+def clauses_of(tree: Any) -> Iterator[tuple[Term, ...]]:
     """Yield the clauses of a tree in conjunctive normal form."""
     if isinstance(tree, Term):
         yield (tree,)
@@ -228,9 +228,9 @@ def _clauses(tree: Any) -> Iterator[tuple[Term, ...]]:
     sign, parts = tree
     if sign == "and":
         for part in parts:
-            yield from _clauses(part)
+            yield from clauses_of(part)
         return
-    each = [list(_clauses(part)) for part in parts]
+    each = [list(clauses_of(part)) for part in parts]
     if np.prod([len(part) for part in each], dtype=float) > MOST_CLAUSES:
         yield (_joined(tree),)
         return

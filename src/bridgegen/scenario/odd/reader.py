@@ -184,6 +184,18 @@ def odd_of(record: Mapping[str, Any]) -> Odd:
     return found
 
 
+def odd_in(document: Document) -> Odd:
+    """Return the ODD of the sections of a module, as a scenario file states them.
+
+    Raises:
+        FileFormatError: it is none; all that was found.
+    """
+    root = ("ODD", "ego")
+    lines = {(*root, *path): line for path, line in document.lines.items()}
+    module = Document({"ODD": {"ego": document.data}}, lines, document.place)
+    return _odd(document.place, {}, [module], [])
+
+
 def _text(path: Path, folder: Path) -> str:
     # A strangers' ODD names files: none outside its folder is read, by whatever link.
     if not path.resolve().is_relative_to(folder.resolve()):
@@ -416,7 +428,7 @@ class _Modules:
             group = key.partition("@")[0]
             if key == "METADATA":
                 continue
-            if group in ("AND", "OR") and "@" in key:
+            if group in ("AND", "OR") and ("@" in key or isinstance(value, dict)):
                 section = self._section(value, group.lower(), document, here, inside)
                 parts += [section] if section is not None else []
             elif key in self.modules or key in self.labels:

@@ -277,24 +277,9 @@ class States:
         positive: bool,
         odd: Odd,
     ) -> "bool | str | Term":
-        spans: list[tuple[float, float, bool, bool]] = []
-        if condition.values:
-            strange = sorted(set(condition.values) - concept.bands.keys())
-            if strange:
-                return _strange(strange)
-            for value in condition.values:
-                band = concept.bands[value]
-                if band is not None:
-                    spans.append((band[0], band[1], True, False))
-        elif concept.bands:
-            return f"{condition.text} is none of its values"
-        else:
-            low, high = (
-                in_unit(x, condition, concept, odd) for x in (condition.low, condition.high)
-            )
-            if low > high:
-                raise FileFormatError(f"{condition.name}: no value is in it ({odd.path})")
-            spans.append((low, high, condition.above, condition.below))
+        spans = spans_of(condition, concept, odd)
+        if isinstance(spans, str):
+            return spans
         if not spans:
             return not positive
         pieces = [_inside(formula, *span) for span in spans]
@@ -311,6 +296,27 @@ class States:
         if not formula.names:
             return bool(formula.evaluate({}))
         return Term(formula, condition.name if positive else f"not {condition.name}")
+
+
+def spans_of(
+    condition: Condition, concept: Concept, odd: Odd
+) -> "str | list[tuple[float, float, bool, bool]]":
+    """Return the intervals of a quantity that a condition asks, or why they cannot be said.
+
+    Each has its ends, and whether each of these is outside.
+    """
+    if condition.values:
+        strange = sorted(set(condition.values) - concept.bands.keys())
+        if strange:
+            return _strange(strange)
+        bands = (concept.bands[value] for value in condition.values)
+        return [(band[0], band[1], True, False) for band in bands if band is not None]
+    if concept.bands:
+        return f"{condition.text} is none of its values"
+    low, high = (in_unit(x, condition, concept, odd) for x in (condition.low, condition.high))
+    if low > high:
+        raise FileFormatError(f"{condition.name}: no value is in it ({odd.path})")
+    return [(low, high, condition.above, condition.below)]
 
 
 def _strange(values: Iterable[str]) -> str:

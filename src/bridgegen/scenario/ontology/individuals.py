@@ -20,6 +20,7 @@ from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.roads import add_road_network
 from bridgegen.scenario.ontology.site import Site
 from bridgegen.scenario.ontology.story import (
+    EGO,
     add_event,
     add_ghosts,
     add_jam,
@@ -131,6 +132,7 @@ def build(
     *,
     driver: str,
     ideal: str = "",
+    odd: str = "",
     site: Site | None = None,
     courses: Mapping[str, Float] | None = None,
 ) -> Individuals:
@@ -142,6 +144,7 @@ def build(
             may be absent where ``site`` is given.
         driver: the ego's driver.
         ideal: its stages that are ideal, separated by commas.
+        odd: the ego's, as `bridgegen.scenario.weather.limits_text` writes it.
         site: the intersection of a map that was made elsewhere; by default a crossroads is
             generated from the static parameters.
         courses: timed poses: ``(V, 4)`` time [s], x, y [m], heading [rad], by the name of
@@ -169,6 +172,8 @@ def build(
     for participant in story.participants:
         put(top, "has_participant", add_participant(builder, participant, place, driver, ideal))
     add_ghosts(builder, story.ghosts)
+    if odd:
+        put(builder.iri(EGO), "has_odd", odd)
     for event in story.events:
         put(top, "has_event", add_event(builder, event, declared, place))
     for name, course in (courses or {}).items():

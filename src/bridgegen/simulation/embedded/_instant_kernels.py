@@ -6,6 +6,7 @@
 import math
 
 from bridgegen.base.compiled import inlined_kernel, kernel, run_kernel_at
+from bridgegen.drivers._odd_kernels import heed_domain
 from bridgegen.drivers.drivers import SCRIPTED
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
 from bridgegen.simulation.embedded._collision_kernels import collides
@@ -78,6 +79,8 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
     """Move all entities to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
     first = 0
+    if plan.limits.shape[0] > 0:
+        demanded = heed_domain(k, demanded, plan, state)
     if plan.has_pedals:
         move_pedals(plan, state)
         if state.holds[0] and plan.is_driven:

@@ -79,6 +79,8 @@ class Plan(NamedTuple):
     leaves: int
     drives: Int
     weathers: Int
+    limits: Float
+    stops_in_lane: int
     scene: Float
     ghosts: Int
     others: Int
@@ -164,6 +166,7 @@ class State(NamedTuple):
     Attributes:
         slots: ``(S,)`` the row's values.
         weather: ``(WEATHER,)`` what sensors and tyres feel, see ``ego/_weather_kernels``.
+        transitions: ``(2,)`` int64, when the ego left its domain, see ``drivers/_odd_kernels``.
         ending: ``(4,)`` int64: recorded instants, 0 while it runs; status; whether it stops now;
             how many transitions there were.
         observed: ``(P,)`` bool, what the probes see.
@@ -266,6 +269,7 @@ class State(NamedTuple):
 
     slots: Annotated[Float, "slots"]
     weather: Annotated[Float, "weather"]
+    transitions: Annotated[Int, 2]
     ending: Annotated[Int, 4]
     observed: Annotated[Bool, "probes"]
     history: Annotated[Bool, "conditions", "instants"]

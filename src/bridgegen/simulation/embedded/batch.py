@@ -18,7 +18,7 @@ from bridgegen.drivers._surroundings_kernels import AROUND
 from bridgegen.drivers._tracking_kernels import TRACK
 from bridgegen.drivers._weather_columns import FRICTION, WEATHER
 from bridgegen.drivers.compiled import CONFLICT
-from bridgegen.drivers.drivers import STAGES, STORYBOARD
+from bridgegen.drivers.drivers import DEMAND, STAGES, STORYBOARD
 from bridgegen.drivers.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.drivers.kinds import DETECTION, NEEDS_ROOM
 from bridgegen.drivers.lane_tables import STRAYS
@@ -124,7 +124,7 @@ class Batch:
         if self._has_addresses:
             return
         self._has_addresses = True
-        drives = DEMANDS.get(self._program.driver.name)
+        drives = DEMANDS.get(self._program.driver.kernel)
         at = here(self.plan, self._roads.tables, self.state, self.record)
         self.plan = addressed(self.plan, drives, at)
 
@@ -258,6 +258,11 @@ class Batch:
             light,
         )
 
+    def note_demands(self, k: int, demanded: Float) -> None:
+        """Note of which rows ``(N,)`` the driver demands a transition at instant k: not 0."""
+        first = self.state.transitions[:, DEMAND]
+        first[(first == 0) & (demanded != 0.0)] = k + 1
+
     def see_lanes(self, views: Float) -> None:
         """Fill what running rows see of the lanes, ``(N, LANES)``; see ``_lane_view_kernels``."""
         body, roads = self._program.bodies[0], self._roads.tables
@@ -339,6 +344,7 @@ class Batch:
             crosswalks=roads.crosswalks[self._rows],
             friction=self.state.weather[:, FRICTION].copy(),
             progress=self._progress(),
+            transitions=self._transitions(),
             corridors=corridors,
             corridor_of=corridor_of,
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
@@ -356,6 +362,10 @@ class Batch:
         corridor_of = np.full(len(self._rows), -1)
         corridor_of[matters] = of
         return self._roads.corridors(networks.tolist()), corridor_of
+
+    def _transitions(self) -> Int:
+        """Return `Rollout.transitions`; no rows where the ego has no operational design domain."""
+        return self.state.transitions - 1 if len(self._program.limits) else NO_TRANSITIONS
 
     def _progress(self) -> Float:
         """Return `Rollout.progress`; no rows where the storyboard moves the ego."""
@@ -375,6 +385,8 @@ NO_DETECTIONS = np.zeros((0, 0, 0, DETECTION))
 NO_PRESENCE = np.zeros((0, 0, 0), dtype=np.bool_)
 
 NO_PROGRESS = np.zeros((0, 2))
+
+NO_TRANSITIONS = np.zeros((0, 2), dtype=np.int64)
 
 NO_LAMPS = np.zeros((0, 0, 0), dtype=np.int8)
 
@@ -414,6 +426,7 @@ def _plan(program: Program, until_collision: bool) -> memory.Plan:
         "comes_and_goes": int(program.comes_and_goes),
         "leaves": int(program.leaves),
         "scene": _scene(program),
+        "stops_in_lane": int(program.driver.stops_in_lane),
         "attends": int(program.attends.size > 0),
         "begins": np.zeros(len(program.actions), dtype=np.int64),
         "follows_courses": 0,

@@ -108,7 +108,7 @@ def tables(
 def _coded(plan: memory.Plan, program: Program) -> memory.Plan:
     """Return a plan with the numbers of the kernels that it needs, in place of addresses."""
     order = list(CALLED)
-    drives = DEMANDS.get(program.driver.name)
+    drives = DEMANDS.get(program.driver.kernel)
     return addressed(plan, drives, lambda kernel: 1 + order.index(kernel))
 
 

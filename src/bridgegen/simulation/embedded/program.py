@@ -276,6 +276,8 @@ class Program:
         stands_apart: ``(E,)`` whether it has a start of its own.
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
             see ``environments.py``; row 0 is the start's.
+        limits: ``(K, 4)`` of the weather in the ego's operational design domain, see
+            ``drivers/_odd_kernels``.
         driver: who drives the ego.
         vehicle: how its body moves, one of `bridgegen.simulation.vehicles.VEHICLES`.
         chassis: of a vehicle with dynamics, see ``_chassis_columns`` and ``_multi_body_columns``;
@@ -336,6 +338,7 @@ class Program:
     couplings: Float
     stands_apart: Int
     weathers: Int
+    limits: Float
     values: Int
     lights: tuple[str, ...]
     first_states: npt.NDArray[np.int8]
@@ -379,8 +382,9 @@ class Program:
 
     @property
     def switches_lamps(self) -> bool:
-        """Whether an action switches indicators or brake lights."""
-        return bool((self.actions[:, DOES] == SWITCH).any())
+        """Whether an action, or the ego's driver, switches indicators or brake lights."""
+        stops = self.driver.stops_in_lane and len(self.limits) > 0
+        return bool(stops or (self.actions[:, DOES] == SWITCH).any())
 
     @property
     def looks_at_lanes(self) -> bool:

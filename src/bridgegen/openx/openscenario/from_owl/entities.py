@@ -8,7 +8,7 @@ from functools import partial
 from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import EntityBody, entity_body
-from bridgegen.openx.openscenario.declarations import DRIVER, GHOST, IDEAL, SIREN
+from bridgegen.openx.openscenario.declarations import DRIVER, GHOST, IDEAL, ODD, SIREN
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity, quoted_element
 from bridgegen.openx.openscenario.values import Double, format_double
 from bridgegen.scenario.language.story import GHOST_UNITS
@@ -23,6 +23,7 @@ LIFTED = {
     "has_reason_to_exceed": "exceeds_limit",
     "has_reason_off_crosswalk": "off_crosswalk",
     "has_siren": SIREN,
+    "has_odd": ODD,
 }
 """Names in files of properties of participants' individuals."""
 
@@ -118,7 +119,7 @@ def _body_of_kind(individuals: Individuals, node: Subject, kind: ParticipantKind
 
 
 def _lifted(individuals: Individuals, node: Subject) -> Iterator[osc.Property]:
-    """Yield the properties that say which rules of the traffic are not for a participant."""
+    """Yield the properties that say which rules are not for a participant, and its domain."""
     for key, name in LIFTED.items():
         text = individuals.optional_text(node, key)
         if text is not None:

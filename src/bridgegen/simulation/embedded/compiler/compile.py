@@ -33,6 +33,7 @@ from bridgegen.simulation.embedded.compiler.layouts import (
     Towing,
     has_siren,
     kind,
+    limits_of,
     measures,
     wheelbase,
 )
@@ -323,6 +324,7 @@ class _Compiler:
             couplings=self.towing.couplings(),
             stands_apart=np.array(self.start.apart, dtype=np.int64),
             weathers=global_actions.environments.rows,
+            limits=limits_of(objects[0], self.place),
             values=np.array(global_actions.values.slots, dtype=np.int64),
             lights=tuple(signals.lights),
             first_states=np.array(signals.first_states, dtype=np.int8),

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from bridgegen.base.arrays import Int
 from bridgegen.base.errors import InputError, UnknownNameError, UnsupportedError
 from bridgegen.drivers import DRIVERS, GUESTS, STORYBOARD, Driver, get, is_planner, is_spec, split
-from bridgegen.drivers.drivers import OTHERS
+from bridgegen.drivers.drivers import OTHERS, STOP_IN_LANE
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
@@ -90,7 +90,8 @@ def driver(controllers: Controllers, place: str) -> Driver:
                     f"{place}, line {controller.line}: the ego is driven by '{name}', "
                     f"which is code; to run it, name it: --ego {shlex.quote(str(name))}"
                 )
-            if str(name) not in DRIVERS | GUESTS and not is_planner(str(name)):
+            plain = str(name).removesuffix(STOP_IN_LANE)
+            if str(name) not in GUESTS and plain not in DRIVERS and not is_planner(str(name)):
                 raise UnsupportedError(
                     f"{place}, line {controller.line}: unknown ego driver '{name}'; "
                     f"known: {', '.join(DRIVERS)} (choose one with --ego)"

@@ -16,9 +16,10 @@ from bridgegen.base.errors import InputError
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import object_class_of
-from bridgegen.openx.openscenario.declarations import SIREN
+from bridgegen.openx.openscenario.declarations import ODD, SIREN
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.values import Value
+from bridgegen.scenario.weather import column, read_limits
 from bridgegen.simulation.embedded._codes import LAYOUT_WIDTH, RIGID, THROUGH, WEIGHTED
 from bridgegen.simulation.embedded.compiler.curves import basis, bends, sampled
 from bridgegen.simulation.embedded.compiler.positions import Positions, is_fixed
@@ -331,6 +332,25 @@ def has_siren(body: Body) -> bool:
     if not isinstance(body, osc.Vehicle) or body.properties is None:
         return False
     return str(body.properties.get(SIREN)).lower() in ("on", "true", "1")
+
+
+def limits_of(body: Body, place: str) -> Float:
+    """Return the ``Program.limits`` that a vehicle states.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    properties = body.properties if isinstance(body, osc.Vehicle) else None
+    text = properties.get(ODD) if properties else None
+    rows: list[tuple[float, float, float, float]] = []
+    if text is not None:
+        try:
+            limits = read_limits(str(text))
+        except InputError as error:
+            raise InputError(f"{place}: property {ODD} of the ego: {error}") from None
+        for number, group in enumerate(limits):
+            rows += [(column(each.name), each.low, each.high, number) for each in group]
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
 def wheelbase(tables: Tables, body: osc.Vehicle) -> float:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.drivers._ghost_kernels import WHAT
 from bridgegen.drivers._tracking_kernels import TRACK
+from bridgegen.drivers._weather_columns import STATED
 from bridgegen.drivers.compiled import CONFLICT
 from bridgegen.drivers.driver_process import DriverError, DriverProcess
 from bridgegen.drivers.interface import (
@@ -129,7 +130,7 @@ class Wheel:
         driver.start()
         self._note = note
         self._every, self._asked = driver.traits.steps(program.time_step), 0
-        self._answer: tuple[Float, Float] | Follower
+        self._answer: tuple[Float, ...] | Follower
         self._missed: list[Float] = []
         self._wants = wants = driver.traits.wants
         self._scene = _scene(program)
@@ -167,16 +168,19 @@ class Wheel:
                 if self._note:
                     self._note(k, answer, batch.running)
             else:
-                self._answer = answer
+                self._answer = answer[:2]
+                for demand in answer[2:]:
+                    batch.note_demands(k, demand)
         elif "history" in self._wants:
             self._missed.append(self._tracks.copy())
         if not isinstance(self._answer, Follower):
-            return self._answer
+            acceleration, curvature = self._answer
+            return acceleration, curvature
         since = (k - self._asked) * self._time_step
         ego = [array[:, 0, k] for array in (record.x, record.y, record.h, record.v)]
         return self._answer.demand(since, np.stack(ego, axis=1), batch.running)
 
-    def _ask(self, k: int) -> tuple[Float, Float] | Plans:
+    def _ask(self, k: int) -> tuple[Float, ...] | Plans:
         """Ask the driver at instant k.
 
         Raises:
@@ -199,6 +203,7 @@ class Wheel:
             tracks=self._tracks,
             stop_distance=self._stop,
             light=self._light,
+            weather=state.weather[:, :STATED],
         )
         takes_two = self._driver.traits.max_rows != 1
         if len(x) == 1 and takes_two and not self._driver.answers_each_row:

@@ -1,0 +1,75 @@
+"""The operational design domain of an ego: when it is left, and what its driver does then.
+
+``state.transitions`` ``(2,)`` int64 has 1 + the instant at which the domain was left, and at which
+the driver demanded that a human takes over; 0: it has not.
+
+The manoeuvre is of the simplest kind: from `PERCEPTION` after the exit the driver demands the
+transition, and drives on as before. Nobody takes over. `TRANSITION` after the demand its hazard
+lights are switched on, and it brakes to a standstill in the lane that it is on, where it stays. Its
+driver steers all the time, begins no lane change any more, and brakes harder where it has to. What
+clears up meanwhile changes nothing.
+"""
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._following_kernels import COMFORT_DECELERATION
+from bridgegen.drivers.drivers import DEMAND, EXIT
+from bridgegen.drivers.kinds import HAZARD
+
+PERCEPTION = 1.0  # s, until the driver knows that it has left its domain; ours
+TRANSITION = 10.0  # s, as for UN R157, whose text on this (5.4.4) was not read
+JERK = 1.0  # m/s³, with which the braking builds up; ours
+SAME_TIME = 1e-9  # s
+
+COLUMN, LOW, HIGH, GROUP = range(4)
+"""Columns of ``Plan.limits``: of the weather, between what it lies, and its group's number."""
+
+
+@kernel
+def is_outside(weather, limits):
+    """Return whether a weather keeps none of the limits of some group.
+
+    Args:
+        weather: ``(WEATHER,)``, see ``_weather_columns``.
+        limits: ``(K, 4)``, see `COLUMN`; those of a group follow each other.
+    """
+    kept = True
+    for i in range(limits.shape[0]):
+        if i == 0 or limits[i, GROUP] != limits[i - 1, GROUP]:
+            if not kept:
+                return True
+            kept = False
+        value = weather[int(limits[i, COLUMN])]
+        kept = kept or (limits[i, LOW] <= value and value <= limits[i, HIGH])
+    return not kept
+
+
+@kernel
+def heed_domain(k, demanded, plan, state):
+    """Note at instant k whether the domain is left; return the acceleration [m/s²] to be had.
+
+    ``demanded`` [m/s²] is what the driver asks for without regard to it.
+    """
+    if state.transitions[EXIT] == 0 and is_outside(state.weather, plan.limits):
+        state.transitions[EXIT] = k + 1
+    if plan.stops_in_lane == 0 or state.transitions[EXIT] == 0:
+        return demanded
+    since = (k + 1 - state.transitions[EXIT]) * plan.dt
+    if state.transitions[DEMAND] == 0 and since >= PERCEPTION - SAME_TIME:
+        state.transitions[DEMAND] = k + 1
+    lasts = stopping_for(k, plan, state)
+    if lasts < 0.0:
+        return demanded
+    state.switched[0] |= HAZARD
+    return min(demanded, -min(JERK * lasts, COMFORT_DECELERATION))
+
+
+@kernel
+def stopping_for(k, plan, state):
+    """Return for how long [s] the manoeuvre has lasted at instant k; below 0: it has not begun."""
+    if plan.stops_in_lane == 0 or state.transitions[DEMAND] == 0:
+        return -1.0
+    since = (k + 1 - state.transitions[DEMAND]) * plan.dt - TRANSITION
+    return since if since < -SAME_TIME else max(since, 0.0)
