@@ -76,10 +76,14 @@ def _typologies(scenarios: Sequence[str]) -> Listed:
 
 @_of("packs")
 def _packs() -> Listed:
-    """Logical scenarios of the packs, by regulation."""
-    from bridgegen.scenario.language.reader import load, pack_names
+    """Logical scenarios of the packs, by regulation, with the clauses that they answer."""
+    from bridgegen.scenario.language.reader import entry_names, load, pack_names, pack_tables
 
-    return ("scenario", "title"), [(name, load(name).title) for name in pack_names()]
+    made = [(name, load(name)) for name in (*pack_names(), *entry_names())]
+    rows = [(name, it.title, ", ".join(each.id for each in it.clauses)) for name, it in made]
+    for pack, table in pack_tables().items():
+        rows += [(f"{pack}: none", f"{text}: {why}", id) for id, text, why in table.unanswered]
+    return ("scenario", "title", "clauses"), rows
 
 
 @_of("algorithms")
