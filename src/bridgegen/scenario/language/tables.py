@@ -2,7 +2,8 @@
 
 An *entry* is a scenario of the catalogue, or of another pack, as the rows that name it want it:
 with their clauses, its parameters held where they say, the cells of its matrix moved. Rows that
-change nothing share the entry of their scenario. What is critical violates all of its clauses.
+change nothing share the entry of their scenario. Clauses are violated by what is critical, or, of a
+scenario with clauses of its own, by the collisions that violate these.
 """
 
 from collections.abc import Container, Mapping, Sequence
@@ -88,10 +89,11 @@ class PackTable:
     @property
     def unanswered(self) -> tuple[tuple[str, str, str], ...]:
         """The clauses that no scenario answers: id, requirement in words, and the reason."""
-        rows = [(self._id(key), row.text, row.lacks) for key, row in self.rows.items()]
+        rows = [(self.id_of(key), row.text, row.lacks) for key, row in self.rows.items()]
         return tuple((id, text, lacks) for id, text, lacks in rows if lacks)
 
-    def _id(self, row: str) -> str:
+    def id_of(self, row: str) -> str:
+        """Return the id of the clause that a row is."""
         return f"{self.file.prefix}-{row}"
 
     def applied(self, entry: str, scenario: LogicalScenario) -> LogicalScenario:
@@ -114,21 +116,27 @@ class PackTable:
             except InputError as error:
                 problems += error.problems
         if problems:
-            raise ScenarioError(*(f"{entry}, {scenario.name}: {one}{where}" for one in problems))
+            raise ScenarioError(*(f"{entry}: {one}{where}" for one in problems))
+        kind = next((own.collisions for own in scenario.clauses if own.collisions), "critical")
         made = replace(
             scenario,
             name=f"{self.file.pack}-{entry}",
             source=row.source or self.file.source,
             parameters=parameters,
             matrix=tuple(grids),
-            clauses=tuple(Clause(self._id(key), self.rows[key].text, "critical") for key in keys),
+            # Others are of the regulation that the scenario was written for.
+            criteria=scenario.criteria if scenario.objective.rule == "criteria" else (),
+            clauses=tuple(Clause(self.id_of(key), self.rows[key].text, kind) for key in keys),
         )
-        if row.given:  # defaults follow what is held, as in a search: clouds come with rain
-            space = made.space(Axis)
-            usual = space.values(space.row({}))
-            moved = {name: replace(it, default=usual[name]) for name, it in parameters.items()}
-            made = replace(made, parameters=moved)
-        try_out(made)
+        try:
+            if row.given:  # defaults follow what is held, as in a search: clouds come with rain
+                space = made.space(Axis)
+                usual = space.values(space.row({}))
+                moved = {name: replace(it, default=usual[name]) for name, it in parameters.items()}
+                made = replace(made, parameters=moved)
+            try_out(made)
+        except ScenarioError as error:
+            raise ScenarioError(*(f"{entry}: {one}{where}" for one in error.problems)) from None
         return made
 
 
@@ -174,7 +182,7 @@ def read_table(document: Document, scenarios: Container[str]) -> PackTable:
     file = section(PackFile, document.data)
     if file is None:
         raise ScenarioError(*shape_problems(PackFile, document))
-    problems, rows = list[str](), _of_typology(file.typology) | file.rows
+    problems, rows = list[str](), _of_typology(file.typology, document) | file.rows
     entries: dict[str, tuple[str, list[str]]] = {}
     for key, row in rows.items():
         where = at(document.at(("rows", key)))
@@ -194,12 +202,13 @@ def read_table(document: Document, scenarios: Container[str]) -> PackTable:
     return PackTable(file, document, rows, entries)
 
 
-def _of_typology(name: str | None) -> dict[str, RowSection]:
+def _of_typology(name: str | None, document: Document) -> dict[str, RowSection]:
     """Return the types of a typology as rows; none without a name."""
     text = resources.files("bridgegen.scenario").joinpath("typology.yaml").read_bytes()
     data: Any = read_plain_yaml(text, "typology.yaml").data
     if name is not None and name not in data:
-        raise ScenarioError(f"there is no typology '{name}'{nearest(name, data)}")
+        where = at(document.at(("typology",)))
+        raise ScenarioError(f"there is no typology '{name}'{nearest(name, data)}{where}")
     found = {}
     for key, kind in data[name]["types"].items() if name else ():
         scenarios, given = list(kind.get("scenarios", ())), kind.get("given", {})
