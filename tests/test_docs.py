@@ -13,7 +13,7 @@ from tests.approval import approve, refuses
 import bridgegen
 from bridgegen.cli import main
 from bridgegen.engine.constants import CONSTANTS, NOT_VARIED
-from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.reader import load, names, pack_tables
 
 DOCS = Path(__file__).parents[1] / "docs"
 SOURCES = Path(bridgegen.__file__).parent
@@ -188,6 +188,16 @@ def test_the_architecture_page_has_the_rooms_as_their_docstrings_are():
     rooms = {one.name for one in made.SOURCES.iterdir() if (one / "__init__.py").exists()}
     assert rooms == set(re.findall(r"^\| \*\*`(\w+)/`", text, re.M))
     assert len(rooms) <= 15
+
+
+def test_the_page_of_packs_has_the_clauses_as_the_tables_are():
+    """Otherwise: python docs/make_packs.py."""
+    spec = importlib.util.spec_from_file_location("make_packs", DOCS / "make_packs.py")
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    text = (DOCS / "packs.md").read_text("utf-8")
+    assert made.page(text) == text
+    assert all(f"### `{pack}`" in text for pack in pack_tables())
 
 
 def test_the_main_job_goes_through_the_files_of_the_architecture_page_in_that_order(

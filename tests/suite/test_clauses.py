@@ -12,8 +12,10 @@ from bridgegen.jobs.suite.clauses import clause_results
 from bridgegen.jobs.suite.page import write_suite_page
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.sentences import clause_in_words
+from bridgegen.jobs.suite.shown import json_of_suite, suite_shown
 from bridgegen.jobs.suite.suite import evaluate_suite
 from bridgegen.scenario import packs
+from bridgegen.scenario.typology import typologies
 
 PACK = Path(packs.__path__[0]) / "r157"
 
@@ -127,3 +129,34 @@ def test_results_do_not_depend_on_workers(tmp_path):
     assert one.results == two.results
     letters = {row.clauses for each in two.results for row in each.rows}
     assert {"f", "p"} <= letters <= {"f", "p", "u"}
+
+
+def test_a_table_s_clauses_are_judged_and_those_without_a_scenario_are_said(tmp_path):
+    """What is critical violates a clause; that none answers another one fails nobody."""
+    out = tmp_path / "out"
+    suite = evaluate_suite("iso34502", egos=["route-follower"], samples=12, out=out, workers=1)
+    clauses = {one.id: one for one in clause_results(suite.results, "route-follower")}
+    for result in suite.results:
+        (clause,) = result.clauses
+        found = clauses[clause["id"]]
+        assert found.failed == sum(row.critical for row in result.rows)
+        assert "u" not in {row.clauses for row in result.rows}
+    assert any(one.failed for one in clauses.values())
+    left = {id for id, *_ in suite.unanswered}
+    assert left == {f"ISO34502-{kind.id}" for kind in typologies()["iso-34502"].uncovered}
+    if not left:  # all are answered one day
+        return
+    one = min(left)
+    shown = json_of_suite(suite)["unanswered"]
+    assert {each["id"] for each in shown} == left
+    assert all(each["reason"] for each in shown)
+    table = next(item for item in suite_shown(suite) if getattr(item, "head", ("",))[0] == "clause")
+    assert (one, "not answered") in [row[:2] for row in table.rows]
+    junit = tmp_path / "junit.xml"
+    outcomes = SuiteCriteria.read(["failed_clauses > 24"], junit).judge(suite)
+    assert [outcome.verdict for outcome in outcomes] == ["passed"]
+    (group,) = (
+        each for each in ElementTree.parse(junit).getroot() if each.get("name") == "not answered"
+    )
+    assert group.get("skipped") == str(len(left))
+    assert f'"id":"{one}"' in write_suite_page(suite, suite.jobs).read_text("utf-8")

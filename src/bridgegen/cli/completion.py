@@ -37,9 +37,9 @@ def completing(kind: str) -> Complete | None:
 
 
 def _scenarios(_: typer.Context) -> Iterable[str]:
-    from bridgegen.scenario.language.reader import names, pack_names
+    from bridgegen.scenario.language.reader import entry_names, names, pack_names
 
-    return (*names(), *pack_names())
+    return (*names(), *pack_names(), *entry_names())
 
 
 def _scenarios_of_suite(ctx: typer.Context) -> Iterable[str]:

@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -76,10 +77,18 @@ def _typologies(scenarios: Sequence[str]) -> Listed:
 
 @_of("packs")
 def _packs() -> Listed:
-    """Logical scenarios of the packs, by regulation."""
-    from bridgegen.scenario.language.reader import load, pack_names
+    """Logical scenarios of the packs, by regulation, with the clauses that they answer."""
+    from bridgegen.scenario.language.reader import load, pack_names, pack_tables
 
-    return ("scenario", "title"), [(name, load(name).title) for name in pack_names()]
+    read = cache(load)
+    made = [(name, read(name)) for name in pack_names()]
+    rows = [(name, it.title, ", ".join(each.id for each in it.clauses)) for name, it in made]
+    for pack, table in pack_tables().items():
+        for entry, (scenario, keys) in table.entries.items():
+            ids = ", ".join(map(table.id_of, keys))
+            rows.append((f"{pack}/{entry}", read(scenario).title, ids))
+        rows += [(f"{pack}: not answered", text, id) for id, text, _ in table.unanswered]
+    return ("scenario", "title", "clauses"), rows
 
 
 @_of("algorithms")

@@ -432,7 +432,8 @@ class Pipeline:
         Not where criteria stand beside harm: they need not ask for what the scenario is about.
         """
         own = self.scenario
-        return bool(own.clauses) or (bool(own.criteria) and own.objective.rule == "criteria")
+        asks = any(clause.collisions != "critical" for clause in own.clauses)
+        return asks or (bool(own.criteria) and own.objective.rule == "criteria")
 
     def _harmless(self, rollout: Rollout, objective: Objective) -> Bool:
         """Return which rows succeed and are not critical."""

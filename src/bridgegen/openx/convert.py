@@ -18,9 +18,9 @@ from bridgegen.openx.openscenario.pruning import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.prepared import logic_path, prepared, roads_of
 from bridgegen.openx.xml import read_bytes
+from bridgegen.scenario.language.reader import entry_names, pack_names
 from bridgegen.scenario.language.reader import load as load_scenario
 from bridgegen.scenario.language.reader import names as scenario_names
-from bridgegen.scenario.language.reader import pack_names
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.ontology.check import check
 from bridgegen.scenario.ontology.files import load, save
@@ -162,6 +162,6 @@ def scenario_of(individuals: Individuals) -> LogicalScenario | None:
         for name in individuals.texts(node, "has_name")
     }
     shipped = {name: name for name in scenario_names()}
-    shipped |= {name.replace("/", "-"): name for name in pack_names()}
+    shipped |= {name.replace("/", "-"): name for name in (*pack_names(), *entry_names())}
     known = said.intersection(shipped)
     return load_scenario(shipped[known.pop()]) if len(said) == len(known) == 1 else None

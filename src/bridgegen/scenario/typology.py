@@ -24,6 +24,8 @@ class CrashType:
         harm: likewise of the harm that these did [%]; None: not known.
         conflicts: labels of the types of conflict in which such a crash shows.
         scenarios: of the catalogue, by name, each with what of the type it has.
+        given: parameters of these scenarios by whose values they are of this type and no other; see
+            `bridgegen.scenario.language.tables`.
     """
 
     id: str
@@ -32,6 +34,7 @@ class CrashType:
     harm: float | None = None
     conflicts: tuple[str, ...] = ()
     scenarios: Mapping[str, str] = field(default_factory=dict)
+    given: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -149,6 +149,12 @@ def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
         if failure is not None:
             facts |= {"failure": failure[0], "status": failure[1].status}
         found.append(Suite(result.entry, _cases(suite, result, group), facts))
+    if suite.unanswered:
+        cases = [
+            Case("bridgegen.unanswered", f"clause {id}: {text}", "skipped", why)
+            for id, text, why in suite.unanswered
+        ]
+        found.append(Suite("not answered", cases))
     return found
 
 

@@ -118,7 +118,7 @@ def judged(
     if not clauses:
         return list(rows)
     found = np.full(len(rows), CellClass.AVOIDED, np.int8)
-    if any(clause.collisions for clause in clauses):
+    if any(clause.collisions in ("any", "preventable") for clause in clauses):
         strict = any(clause.collisions == "preventable" for clause in clauses)
         found = _classes(pipeline, simulator, X, rows, MODELS if strict else ())
     ids = [criterion.id for criterion in pipeline.monitor]
@@ -152,6 +152,8 @@ def _letter(
     # criterion.
     if any(ids[i] in criteria for i in row.violated):
         return FAILED
+    if collisions == "critical":
+        return FAILED if row.critical else NOT_APPLICABLE if row.unsafe_start else PASSED
     if collisions is None or found == CellClass.AVOIDED:
         return PASSED
     if collisions == "any" or found == CellClass.PREVENTABLE:

@@ -13,7 +13,7 @@ from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
 from bridgegen.results.failures import FailureFile, failure_of
 from bridgegen.scenario.language.parameters import nearest
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES
-from bridgegen.scenario.language.reader import load, pack_names
+from bridgegen.scenario.language.reader import entry_names, load, pack_names
 from bridgegen.scenario.language.reader import names as catalogue_names
 
 MOST_FILES = 100_000
@@ -91,7 +91,7 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
         InputError: a path does not exist, or a file that is named is no scenario; nothing is found.
     """
     problems, found = list[str](), dict[str, Entry]()
-    shipped = (*catalogue_names(), *pack_names())
+    shipped = (*catalogue_names(), *pack_names(), *entry_names())
     for item in given:
         path = Path(item)
         if path.is_dir():

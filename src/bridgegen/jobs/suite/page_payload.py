@@ -361,7 +361,11 @@ def _clauses(suite: SuiteRun) -> list[dict[str, Any]]:
                 "words": clause_in_words(clause),
                 "rows": [clause.passed, clause.failed, clause.not_run, clause.not_applicable],
             }
-    return list(found.values())
+    left = [
+        {"id": id, "text": f"{text}. Not answered: {why}", "entries": (), "of": {}}
+        for id, text, why in suite.unanswered
+    ]
+    return [*found.values(), *left]
 
 
 def _facts(suite: SuiteRun) -> list[str]:

@@ -38,6 +38,9 @@ def json_of_suite(suite: SuiteRun) -> dict[str, Any]:
             for ego in suite.egos
             for result in clause_results(suite.results, ego)
         ],
+        "unanswered": [
+            dict(zip(("id", "text", "reason"), clause, strict=True)) for clause in suite.unanswered
+        ],
         "entries": [
             {
                 "entry": result.entry,
@@ -85,11 +88,13 @@ def suite_shown(suite: SuiteRun) -> list[str | Table]:
     if len(by_entry) > len(listed):
         found.append(f"and {len(by_entry) - len(listed)} more")
     by_ego = [clause_results(suite.results, ego) for ego in suite.egos]
-    if any(by_ego):
+    if any(by_ego) or suite.unanswered:
         clauses = [
             (pair[0].id, *map(clause_in_words, pair), pair[0].text)
             for pair in zip(*by_ego, strict=True)
         ]
+        none = ["not answered"] * len(egos)
+        clauses += [(id, *none, f"{text}: {why}") for id, text, why in suite.unanswered]
         found += ["", Table(("clause", *egos, "requirement"), clauses)]
     by_label = zip(suite.egos, suite.labels, strict=True)
     found += ["", *(line for ego, label in by_label for line in _totals(suite, ego, label))]

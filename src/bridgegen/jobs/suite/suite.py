@@ -31,6 +31,7 @@ from bridgegen.jobs.suite.results import EntryResult, Header
 from bridgegen.results.store.sqlite import Lock
 from bridgegen.scenario.language.criteria import read_criterion
 from bridgegen.scenario.language.protocols import read_clause
+from bridgegen.scenario.language.reader import pack_tables
 from bridgegen.simulation import vehicles
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 
@@ -56,6 +57,8 @@ class SuiteRun:
         jobs: of which they are the results, in the same order; empty where they were only read.
         maps: preventability maps of its scenarios, in its folder.
         sealed: what an assessor's key drew and found, in its folder.
+        unanswered: clauses of its packs that no scenario answers: id, requirement in words, reason;
+            empty where results were only read.
         page: that shows all this; None where none was written.
     """
 
@@ -66,6 +69,7 @@ class SuiteRun:
     jobs: tuple[Job, ...] = ()
     maps: "tuple[PreventabilityMap, ...]" = ()
     sealed: "Sealed | None" = None
+    unanswered: tuple[tuple[str, str, str], ...] = ()
     page: Path | None = None
 
     @cached_property
@@ -224,7 +228,9 @@ def run_entries(
     finally:
         lock.release()
     results = tuple(done[job.entry.name, job.ego or ""] for job in jobs)
-    return SuiteRun(folder, drivers, results, settings, tuple(jobs))
+    tables = [table for item in files if (table := pack_tables().get(str(item))) is not None]
+    left = tuple(clause for table in tables for clause in table.unanswered)
+    return SuiteRun(folder, drivers, results, settings, tuple(jobs), unanswered=left)
 
 
 def read_suite(folder: Path) -> SuiteRun:

@@ -216,7 +216,7 @@ def _value(
 # --- Clauses: what a regulation requires of the ego, and what decides it ---
 
 
-Collisions = Literal["any", "preventable"]
+Collisions = Literal["any", "preventable", "critical"]
 
 
 @dataclass(frozen=True)
@@ -226,8 +226,9 @@ class Clause:
     Attributes:
         id: of the clause, ``R157-5.2.5.2`` say.
         text: the requirement in words.
-        collisions: which collisions of the ego violate it: "any", or those that are "preventable"
-            by the models of UN R157; None: none does.
+        collisions: which collisions of the ego violate it: "any"; those that are "preventable"
+            by the models of UN R157; or what is "critical" by the scenario's own rule, near misses
+            by harm among it; None: none does.
         criteria: ids of the criteria whose violation violates it.
         place: file and line that declare it, for messages.
     """
@@ -256,8 +257,8 @@ class ClauseSection(ShapedSection):
     text: Text
     """Requirement in words."""
     collisions: Collisions | None = None
-    """Collisions of the ego that violate the clause: any, or those that a model of UN R157
-    avoids."""
+    """Collisions of the ego that violate the clause: any; those that a model of UN R157 avoids; or
+    what is critical by the scenario's own rule, near misses by harm among it."""
     criteria: Annotated[list[Tag], Field(default=[])]
     """Ids of criteria of this file; a violated one violates the clause."""
 

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -45,6 +46,7 @@ from bridgegen.scenario.language.schema import (
 from bridgegen.scenario.language.schema_types import Section, section, shape_problems
 from bridgegen.scenario.language.story import Story
 from bridgegen.scenario.language.storyboard import Storyboard, read_recorded
+from bridgegen.scenario.language.tables import PackTable, read_table
 
 _PREFIX = re.compile(r"[a-z][a-z0-9_]{0,30}_")
 
@@ -76,6 +78,24 @@ def pack_names() -> tuple[str, ...]:
     )
 
 
+@cache
+def pack_tables() -> Mapping[str, PackTable]:
+    """Return the packs that ship as tables of clauses, by name."""
+    folder = resources.files("bridgegen.scenario.packs")
+    known = {*names(), *pack_names()}
+    files = sorted(item.name for item in folder.iterdir() if item.name.endswith(".yaml"))
+    read = [read_plain_yaml(folder.joinpath(file).read_bytes(), file) for file in files]
+    tables = [read_table(document, known) for document in read]
+    return {table.file.pack: table for table in tables}
+
+
+def entry_names() -> tuple[str, ...]:
+    """Return the names of the entries of all tables that ship, each ``PACK/NAME``."""
+    return tuple(
+        f"{pack}/{name}" for pack, table in pack_tables().items() for name in table.entries
+    )
+
+
 def shipped_text(name: str) -> bytes:
     """Return the file of a scenario or fragment that ships.
 
@@ -98,7 +118,12 @@ def load(name_or_path: str | Path) -> LogicalScenario:
         FileFormatError: the file is missing, unreadable, too large, or no plain YAML.
         ScenarioError: it breaks rules; all of them, with file and line.
     """
-    return build(*document_of(name_or_path))
+    pack, _, entry = str(name_or_path).partition("/")
+    if (table := pack_tables().get(pack)) is None:
+        return build(*document_of(name_or_path))
+    if entry not in table.entries:
+        raise UnknownNameError("scenario", str(name_or_path), entry_names())
+    return table.applied(entry, load(table.entries[entry][0]))
 
 
 def document_of(name_or_path: str | Path) -> tuple[Document, Path | None]:

@@ -1,1 +1,1 @@
-"""Packs of logical scenarios, a folder of YAML files each, by regulation; data only."""
+"""Packs by regulation: folders of logical scenarios, or tables of clauses; YAML only."""
