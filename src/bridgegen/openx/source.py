@@ -143,6 +143,8 @@ class OntologySource:
         ideal: str = "",
     ) -> None:
         self.constraints = self._scenario = scenario
+        if road_map is not None:
+            _agree(scenario, road_map)
         self._driver, self._ideal, self._map = driver, ideal, road_map
         static = tuple(
             name for name, parameter in scenario.parameters.items() if parameter.axis is Axis.STATIC
@@ -230,6 +232,8 @@ class OntologySource:
             courses: see `bridgegen.scenario.ontology.individuals.build`.
         """
         site, scenario = self.place(values), self._settled(values)
+        if site and self._map:
+            site = replace(site, left_hand=self._map.model.left_hand)
         if site and self._map and self._map.sites:
             scenario = at_site(scenario, self._map.model, site, int(values[PLACE]))
         if site and road_file:
@@ -264,6 +268,22 @@ def _chosen(participant: Participant, values: Mapping[str, float]) -> Participan
         if participant.place_by
         else participant
     )
+
+
+def _agree(scenario: LogicalScenario, road_map: RoadMap) -> None:
+    """Refuse a map with the other traffic, or of another country, than a scenario states."""
+    roads, model = scenario.roads, road_map.model
+    if roads.left_hand and not model.left_hand:
+        raise InputError(
+            f"{scenario.place}: traffic drives on the left, and on the right on {road_map.path} "
+            "(the rule of its roads is RHT, or not stated)"
+        )
+    there = sorted({kind.country or "none" for road in model.roads for kind in road.types})
+    if roads.country and there != [roads.country]:
+        raise InputError(
+            f"{scenario.place}: rules are those of {roads.country}; the roads of {road_map.path} "
+            f"must state that country in their type, got {', '.join(there) or 'none'}"
+        )
 
 
 @dataclass(frozen=True)
