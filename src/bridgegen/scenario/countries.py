@@ -47,8 +47,8 @@ _SIDES = MappingProxyType(
 )
 _SIDE = re.compile(
     r"\b(left-hand|right-hand|leftmost|rightmost|left|right)\b"
-    # Words that name no side: right of way, a right angle, what has left, what is left.
-    r"(?! of way| angle| (?:its|the|their|out|over|alone|uncovered) | (?:before|to) (?:act|brake)\b)"
+    # Words that name no side: right of way, a right angle, who has left, what is left.
+    r"(?! of way| angle| away| (?:its|the|their|out|over|alone|enough|no|to act|to brake)\b)"
     r"(?<!\bhas left)(?<!\bhave left)(?<!\bis left)(?<!\bare left)(?<!\bwas left)(?<!\d s left)",
     re.IGNORECASE,
 )
@@ -67,6 +67,6 @@ def in_the_mirror(text: str) -> str:
     return _SIDE.sub(other, text)
 
 
-def first_in_the_mirror(code: str | None) -> bool:
-    """Return whether somebody goes first at an unmarked junction of a country, by its code."""
-    return all(country.first for country in COUNTRIES.values() if country.code == code)
+def country_of(code: str) -> Country | None:
+    """Return a country by its code; None of one whose rules are not known here."""
+    return next((country for country in COUNTRIES.values() if country.code == code), None)

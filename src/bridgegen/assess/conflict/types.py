@@ -9,6 +9,7 @@ from enum import IntEnum
 
 from bridgegen.assess.conflict import _codes
 from bridgegen.base.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
+from bridgegen.scenario.countries import in_the_mirror
 
 
 class ConflictType(IntEnum):
@@ -95,6 +96,12 @@ class Zone(IntEnum):
         if self in (Zone.LEFT, Zone.RIGHT):
             return f"{words} side"
         return f"{words} corner" if " " in words else words
+
+
+    @property
+    def other_side(self) -> "Zone":
+        """The same edge or corner in the mirror."""
+        return Zone[in_the_mirror(self.name.replace("_", " ")).upper().replace(" ", "_")]
 
 
 class Responsible(IntEnum):

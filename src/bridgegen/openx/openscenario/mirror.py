@@ -83,10 +83,11 @@ def mirrored(scenario: OpenScenario, place: str = "scenario") -> OpenScenario:
         FileFormatError: a parameter stands for a lane's id, a side, a rule or a direction; by line.
     """
     problems: list[str] = []
+    has_expressions = scenario.file_header.rev_minor > 0
 
     def change(element: Element) -> Element:
         try:
-            return _mirrored(element)
+            return _mirrored(element, has_expressions)
         except ValueError as error:
             problems.append(f"{place}: {error} (line {element.line})")
             return element
@@ -97,7 +98,7 @@ def mirrored(scenario: OpenScenario, place: str = "scenario") -> OpenScenario:
     return replace(found, left_hand=not scenario.left_hand)
 
 
-def _mirrored(element: Element) -> Element:
+def _mirrored(element: Element, has_expressions: bool) -> Element:
     cls = type(element)
     names = NEGATED.get(cls, ())
     if isinstance(element, _ANGLES) and _known(element, "angle_type") != AngleType.PITCH:
@@ -120,7 +121,7 @@ def _mirrored(element: Element) -> Element:
     if cls in TURNS:
         name, total = TURNS[cls]
         if (value := getattr(element, name)) is not None:
-            changes[name] = _turned(value, total)
+            changes[name] = _turned(value, total, has_expressions)
     return replace(element, **changes)
 
 
@@ -155,11 +156,15 @@ def _negative(value: Any) -> Any:
     return _inverse(value, "-")
 
 
-def _turned(value: Any, total: float) -> Any:
+def _turned(value: Any, total: float, has_expressions: bool) -> Any:
     """Return ``total`` − value within a turn, as an expression, of which the value is read again.
 
-    As a number it would lose its last bits.
+    As a number it may lose its last bits; if it does not, it is one.
     """
+    if isinstance(value, float):
+        other = (total - value) % (2.0 * math.pi)
+        if not has_expressions or (total - other) % (2.0 * math.pi) == value:
+            return other
     return _inverse(value, f"{total!r}-", f"%{2.0 * math.pi!r}")
 
 
