@@ -183,7 +183,9 @@ class OntologySource:
     def road(self) -> str:
         """See `Source`."""
         if self._map is None:
-            return f"generated {self._scenario.roads.template}"
+            roads = self._scenario.roads
+            side = ", traffic on the left" if roads.left_hand else ""
+            return f"generated {roads.template}{side}"
         if self._map.sites:
             places = len({site.place_id for site in self._map.sites})
             if self._map.site.kind is None:

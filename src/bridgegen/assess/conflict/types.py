@@ -9,7 +9,7 @@ from enum import IntEnum
 
 from bridgegen.assess.conflict import _codes
 from bridgegen.base.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
-from bridgegen.scenario.countries import in_the_mirror
+from bridgegen.scenario.countries import COUNTRIES, in_the_mirror
 
 
 class ConflictType(IntEnum):
@@ -151,6 +151,7 @@ class Rule(IntEnum):
     DID_NOT_KEEP_LANE = _codes.DID_NOT_KEEP_LANE
     LEFT_THE_ROAD = _codes.LEFT_THE_ROAD
     CUT_IN_REQUIRED = _codes.CUT_IN_REQUIRED
+    NO_PRIORITY = _codes.NO_PRIORITY
 
     @property
     def label(self) -> str:
@@ -265,6 +266,10 @@ RULES = {
         "did not avoid a cut-in that a system must avoid: it came over the marking at more than "
         "v / 12 m/s² + 0.35 s to collision, v being the closing speed",
         "UN R157, 5.2.5.2",
+    ),
+    Rule.NO_PRIORITY: (
+        "drove on where nobody has priority by law",
+        COUNTRIES["UK"].source,
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",
