@@ -14,8 +14,8 @@ from typing import Any
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError, InputError, ScenarioError
-from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.mirror import as_written, right_hand
+from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
 from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario import model as osc

@@ -20,7 +20,7 @@ from bridgegen.assess.conflict.plausibility import (
     towed_by_of,
     window_of,
 )
-from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
+from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule, Zone
 from bridgegen.assess.metrics import (
     OF_BASELINE,
     braking,

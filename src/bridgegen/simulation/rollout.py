@@ -223,13 +223,13 @@ class Rollout:
             return self
         negated = {name: opposite(getattr(self, name)) for name in ("y", "h", "offset")}
         seen = opposite(self.detections, columns=(kinds.Y, kinds.HEADING))
-        lines, crosswalks = (opposite(a, columns=(1, 2)) for a in (self.stop_lines, self.crosswalks))
+        lines = opposite(self.stop_lines, columns=(1, 2))
         return replace(
             self,
             **negated,
             detections=seen,
             stop_lines=lines,
-            crosswalks=crosswalks,
+            crosswalks=opposite(self.crosswalks, columns=(1, 2)),
             lamps=kinds.other_side(self.lamps),
             left_hand=False,
         )

@@ -97,7 +97,6 @@ class Zone(IntEnum):
             return f"{words} side"
         return f"{words} corner" if " " in words else words
 
-
     @property
     def other_side(self) -> "Zone":
         """The same edge or corner in the mirror."""

@@ -101,9 +101,7 @@ def _negative(cubic: Cubic) -> Cubic:
 
 
 def _turned(lane: Lane) -> tuple[RoadMark, ...]:
-    return tuple(
-        replace(mark, type=_DOUBLE.get(mark.type, mark.type)) for mark in lane.road_marks
-    )
+    return tuple(replace(mark, type=_DOUBLE.get(mark.type, mark.type)) for mark in lane.road_marks)
 
 
 def _stated(datum: UserData) -> str:

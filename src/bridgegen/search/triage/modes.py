@@ -15,8 +15,8 @@ import numpy as np
 
 from bridgegen.assess.conflict.findings import Findings
 from bridgegen.assess.conflict.types import RULES, ConflictType, Rule
-from bridgegen.scenario.countries import in_the_mirror
 from bridgegen.base.arrays import Float, Int
+from bridgegen.scenario.countries import in_the_mirror
 
 APART = 0.25
 """Least distance between clusters: root mean square over the searched parameters, 0 to 1."""
