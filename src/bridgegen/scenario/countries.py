@@ -35,7 +35,7 @@ COUNTRIES: Mapping[str, Country] = MappingProxyType(
     {
         "DE": Country("DE", "right", "right", "StVO § 8 (1); Vienna Convention, Art. 18 (4) (a)"),
         "JP": Country("JP", "left", "left", "Road Traffic Act (Act No. 105 of 1960), Art. 36 (1)"),
-        "UK": Country("GB", "left", None, "The Highway Code (2022), rule 146; no statute has one"),
+        "UK": Country("GB", "left", None, "The Highway Code (2022), rule 146"),
         "US": Country("US", "right", "right", "Uniform Vehicle Code (2000), § 11-401"),
     }
 )
