@@ -347,7 +347,7 @@ def test_slides_are_found_and_lane_changes_are_none():
     for name, ego in (("pedestrian-at-night", "route-follower"), ("cut-out", "reference")):
         scenario = load(name)
         pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego=ego))
-        rollout = pipeline.rollout(pipeline.space.decode(rng.random((60, pipeline.space.n_var))))
+        rollout = pipeline.rollout(pipeline.space.decode(rng.random((120, pipeline.space.n_var))))
         there = np.arange(rollout.shape[2]) < rollout.n_steps[:, np.newaxis]
         off = np.abs(np.where(there, rollout.offset[:, 0], 0.0)).max(axis=1) > 1.75
         found = analyse(rollout)

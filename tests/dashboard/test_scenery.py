@@ -127,7 +127,7 @@ def test_every_fact_is_of_a_scenario_and_known():
     of_odds = {"no junction", "no sign", "roundabout"}  # values that an ODD may ask
     assert facts - of_odds <= named
     assert named - facts == {  # that a scenario of one's own may have
-        "left-hand traffic", "participant:e-scooter", "participant:animal", "participant:tram",
+        "left-hand traffic", "participant:e-scooter", "participant:tram",
         "participant:motorcycle", "t-junction",
     }  # fmt: skip
 

@@ -24,6 +24,7 @@ from bridgegen.scenario.ontology.shapes import turtle
 from bridgegen.scenario.ontology.vocabulary import SUBCLASS, TYPE, bg, local_name, tbox
 
 from ..openx.opendrive.kinds import KINDS
+from .conftest import in_rain_and_haze
 
 
 @cache
@@ -31,7 +32,7 @@ def concrete(name):
     """A valid scenario of the catalogue, at no boundary."""
     scenario = load(name)
     space = scenario.space(axes=list(Axis))
-    values = space.values(space.decode([[0.4] * space.n_var])[0])
+    values = in_rain_and_haze(space)
     return scenario, build(scenario, values, driver="reference")
 
 

@@ -17,6 +17,8 @@ from bridgegen.scenario.ontology.individuals import build, build_static
 from bridgegen.scenario.ontology.questions import ask, ask_file, ask_sparql, questions
 from bridgegen.scenario.ontology.vocabulary import SCENARIOS, TYPE, bg
 
+from .conftest import in_rain_and_haze
+
 # The scenarios' descriptions: from leg, to leg, turn; legs A south, B west, C north, D east.
 ROUTES = {
     "crossroads-s1": {"ego": ("C", "A", "straight"), "bv": ("B", "D", "straight")},
@@ -29,7 +31,7 @@ ROUTES = {
 def concrete(name):
     scenario = load(name)
     space = scenario.space(axes=["static", "participants", "weather"])
-    values = space.values(space.decode([[0.4] * space.n_var])[0])
+    values = in_rain_and_haze(space)
     return scenario, values, build(scenario, values, driver="reference")
 
 

@@ -14,6 +14,8 @@ from bridgegen.scenario.ontology.individuals import build
 from bridgegen.scenario.ontology.reasoner import reason, require, smallest
 from bridgegen.scenario.ontology.vocabulary import OWL, SCENARIOS, SUBCLASS, TYPE, XSD, bg, tbox
 
+from .conftest import in_rain_and_haze
+
 
 def installed() -> bool:
     try:
@@ -67,7 +69,7 @@ def test_every_scenario_of_the_catalogue_is_consistent(name):
 def test_saved_scenarios_are_consistent(name, tmp_path):
     scenario = load(name)
     space = scenario.space(axes=["static", "participants", "weather"])
-    values = space.values(space.decode([[0.4] * space.n_var])[0])
+    values = in_rain_and_haze(space)
     save(build(scenario, values, driver="reference"), tmp_path / "s.owl")
     found = reason(tmp_path / "s.owl")
     assert found.problems == []

@@ -211,9 +211,12 @@ def layered() -> LogicalScenario:
 
 @pytest.fixture(scope="session")
 def values(layered) -> dict[str, float]:
-    """The middle of every range that is left."""
+    """The middle of every range that is left, in light rain, haze and at night."""
     space = layered.space()
-    return space.values(space.decode([[0.5] * space.n_var])[0])
+    shares = np.full(space.n_var, 0.5)
+    for name, share in {"precipitation": 0.95, "fog_density": 0.95, "sun_altitude_angle": 0.1}.items():
+        shares[space.index(name)] = share
+    return space.values(space.decode([shares])[0])
 
 
 @pytest.fixture(scope="session")

@@ -198,9 +198,11 @@ def test_the_module_is_of_these_kernels():
     assert portable.MODULE.read_bytes().endswith(b"\x09bridgegen" + portable.sources().encode())
 
 
-def test_all_of_the_catalogue_is_simulated_in_pages():
-    for name in names():
-        assert "refused" not in simulation_payload(made(name, "route-follower")), name
+def test_all_of_the_catalogue_is_simulated_in_pages_but_where_storyboards_differ():
+    refused = {
+        name for name in names() if "refused" in simulation_payload(made(name, "route-follower"))
+    }
+    assert refused == {"cyclist-crosses"}  # its cyclist starts on one road or another
 
 
 def test_a_drivers_page_says_why_it_replays_only(tmp_path):

@@ -373,6 +373,7 @@ def states_of(scenario: LogicalScenario, *, on_map: bool = False) -> States:
     others = [each for each in scenario.participants if each.name != "ego"]
     kinds = {name for each in others for name in (each.types or (each.model or each.type,))}
     facts = {f"participant:{kind_of(name)}" for name in kinds}
+    facts.discard("participant:other")  # an obstacle
     facts |= {"participant:emergency" for each in scenario.participants if each.siren}
     facts |= {"jam"} if scenario.story.jams else set()
     facts |= {"road works", "warning sign"} if scenario.story.works else set()
