@@ -244,6 +244,7 @@ def test_sides_turn_in_words_and_nothing_else():
         ("did not give way to traffic from the right", "did not give way to traffic from the left"),
         ("Left turn across the right-hand lane", "Right turn across the left-hand lane"),
         ("The ego left its lane, to the left", "The ego left its lane, to the right"),
+        ("from the south, turns left, to the west", "from the north, turns right, to the west"),
         ("right of way, at a right angle", "right of way, at a right angle"),
         ("a collision course with 2.2 s left, which", "a collision course with 2.2 s left, which"),
         ("a cut-in that left enough time", "a cut-in that left enough time"),

@@ -87,24 +87,19 @@ def _lanes(view: Float) -> Float:
 
 
 def _lane(lane: Lane) -> Lane:
-    return Lane(
+    sides: dict[str, Any] = {}
+    for side, other in (("left", "right"), ("right", "left")):
+        sides[side] = opposite(getattr(lane, other), (1,))
+        sides[f"{side}_lane"] = _name(getattr(lane, f"{other}_lane"))
+        for name in ("{}_is_same_way", "{}_marking", "may_change_{}"):
+            sides[name.format(side)] = getattr(lane, name.format(other))
+    return replace(
+        lane,
         id=_name(lane.id),
-        kind=lane.kind,
         centre=opposite(lane.centre, (1, 2)),
-        left=opposite(lane.right, (1,)),
-        right=opposite(lane.left, (1,)),
-        speed_limit=lane.speed_limit,
-        junction=lane.junction,
         next=_names(lane.next),
         previous=_names(lane.previous),
-        left_lane=_name(lane.right_lane),
-        right_lane=_name(lane.left_lane),
-        left_is_same_way=lane.right_is_same_way,
-        right_is_same_way=lane.left_is_same_way,
-        left_marking=lane.right_marking,
-        right_marking=lane.left_marking,
-        may_change_left=lane.may_change_right,
-        may_change_right=lane.may_change_left,
+        **sides,
     )
 
 

@@ -42,11 +42,9 @@ COUNTRIES: Mapping[str, Country] = MappingProxyType(
 """By the name that a scenario file gives. The Vienna Convention leaves it to the law of a country
 that drives on the left who goes first there (Art. 18 (4) (b)): it is no mirror image."""
 
-_SIDES = MappingProxyType(
-    {"left": "right", "right": "left", "leftmost": "rightmost", "rightmost": "leftmost"}
-)
+_OTHER = {"left": "right", "right": "left", "north": "south", "south": "north"}
 _SIDE = re.compile(
-    r"\b(left-hand|right-hand|leftmost|rightmost|left|right)\b"
+    r"(?<!° )\b(left|right|north|south)\b"
     # Words that name no side: right of way, a right angle, who has left, what is left.
     r"(?! of way| angle| away| (?:its|the|their|out|over|alone|enough|no|to act|to brake)\b)"
     r"(?<!\bhas left)(?<!\bhave left)(?<!\bis left)(?<!\bare left)(?<!\bwas left)(?<!\d s left)",
@@ -55,14 +53,11 @@ _SIDE = re.compile(
 
 
 def in_the_mirror(text: str) -> str:
-    """Return a text in which left is right and right is left, where the words name sides."""
+    """Return a text with left for right and north for south, where the words name sides."""
 
     def other(found: re.Match[str]) -> str:
-        word = found[0]
-        first, rest = word.partition("-")[::2]
-        side = _SIDES[first.lower()]
-        side = side.capitalize() if first[0].isupper() else side
-        return f"{side}-{rest}" if rest else side
+        side = _OTHER[found[0].lower()]
+        return side.capitalize() if found[0][0].isupper() else side
 
     return _SIDE.sub(other, text)
 
