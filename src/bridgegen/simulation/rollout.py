@@ -221,12 +221,12 @@ class Rollout:
         """
         if not self.left_hand:
             return self
-        negated = {name: opposite(getattr(self, name)) for name in ("y", "h", "offset")}
+        changed: dict[str, Any] = {n: opposite(getattr(self, n)) for n in ("y", "h", "offset")}
         seen = opposite(self.detections, columns=(kinds.Y, kinds.HEADING))
         lines = opposite(self.stop_lines, columns=(1, 2))
         return replace(
             self,
-            **negated,
+            **changed,
             detections=seen,
             stop_lines=lines,
             crosswalks=opposite(self.crosswalks, columns=(1, 2)),

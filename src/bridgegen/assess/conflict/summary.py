@@ -394,5 +394,5 @@ def _by_law(found: ConflictSummary, rule: Rule, conflicts: Conflicts) -> Conflic
         found = replace(found, rule_source=law, sentence=sentence)
     if not conflicts.left_hand:
         return found
-    texts = {name: in_the_mirror(getattr(found, name)) for name in _SAID}
+    texts: dict[str, Any] = {name: in_the_mirror(getattr(found, name)) for name in _SAID}
     return replace(found, **texts, aside=found.aside if found.partner else -found.aside)

@@ -50,7 +50,6 @@ NEGATED: dict[type, tuple[str, ...]] = {
 }
 """The numbers that change their sign, by class."""
 
-_CUBICS = ("superelevations", "lane_offsets")  # of a road: positive to the left, or left up
 _WORDS = {"left": "right", "right": "left", "increase": "decrease", "decrease": "increase"}
 _RULES = {"RHT": "LHT", "LHT": "RHT"}
 _DOUBLE = {"solid broken": "broken solid", "broken solid": "solid broken"}
@@ -78,8 +77,12 @@ def mirrored(record: Any) -> Any:
     record = replace(record, **changes)
     match record:
         case Road():
-            cubics = {name: tuple(map(_negative, getattr(record, name))) for name in _CUBICS}
-            return replace(record, rule=_RULES[record.rule], **cubics)
+            return replace(
+                record,
+                rule=_RULES[record.rule],
+                superelevations=tuple(map(_negative, record.superelevations)),
+                lane_offsets=tuple(map(_negative, record.lane_offsets)),
+            )
         case LaneSection():
             centre = tuple(replace(lane, road_marks=_turned(lane)) for lane in record.center)
             return replace(record, left=record.right[::-1], center=centre, right=record.left[::-1])

@@ -83,7 +83,7 @@ def mirrored(scenario: OpenScenario, place: str = "scenario") -> OpenScenario:
         FileFormatError: a parameter stands for a lane's id, a side, a rule or a direction; by line.
     """
     problems: list[str] = []
-    has_expressions = scenario.file_header.rev_minor > 0
+    has_expressions = scenario.file_header.rev_minor != 0
 
     def change(element: Element) -> Element:
         try:

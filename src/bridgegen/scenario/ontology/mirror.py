@@ -50,7 +50,7 @@ def mirrored(individuals: Individuals) -> Individuals:
     if not is_left_hand(individuals):
         return individuals
     names = {term.value.rpartition("#")[2] for term in NEGATED}
-    sideways = {
+    sideways: set[object] = {
         node
         for node in individuals.of_class("Parameter")
         if names.issuperset(individuals.texts(node, "binds_property"))
