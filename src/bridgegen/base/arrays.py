@@ -69,3 +69,12 @@ class Taken:
     def __getitem__(self, at: Any, /) -> Any:
         rows, *column = at if isinstance(at, tuple) else (at,)
         return self._table[(self._rows[rows], *column) if column else self._rows[rows]]
+
+
+def opposite(array: npt.NDArray[Any], columns: tuple[int, ...] | None = None) -> npt.NDArray[Any]:
+    """Return 0 − array, or an array in which some columns of its last axis are so."""
+    if columns is None:
+        return 0.0 - array
+    found = array.copy()
+    found[..., columns] = 0.0 - array[..., columns]
+    return found

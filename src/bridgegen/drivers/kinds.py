@@ -1,5 +1,10 @@
 """What an entity is, as numbers that compiled code can hold: `OBJECT_CLASSES`, numbered."""
 
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
 from bridgegen.scenario.participants import OBJECT_CLASSES
 
 NAMES = tuple(object_class.name for object_class in OBJECT_CLASSES)
@@ -28,6 +33,14 @@ BLUE = 16
 """Bit of the blue lights of an emergency vehicle on a call; drivers know of them by its siren."""
 
 HAZARD = LEFT | RIGHT
+
+
+def other_side(lamps: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return what lamps show with the left indicator for the right one, and the other way round."""
+    bits = lamps.astype(np.int64)
+    found = (bits & ~HAZARD) | ((bits & LEFT) << 1) | ((bits & RIGHT) >> 1)
+    return found.astype(lamps.dtype)
+
 
 BRAKE_LIGHTS_FROM = 1.3
 """Deceleration from which brake lights must be lit [m/s²]. Source: UN R13-H, 5.2.22: not below 0.7

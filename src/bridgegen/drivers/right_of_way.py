@@ -1,5 +1,8 @@
 """Right of way where two routes cross: by signs and the map, else priority to the right.
 
+Who goes first at a junction without lights, signs and priorities, the country of the roads says, if
+it is known; see `bridgegen.scenario.countries`.
+
 Sources: StVO § 8 (right of way: signs, else priority to the right), § 9 (a left turn waits for
 oncoming traffic), § 10 (who comes from off the road), § 38 (blue light and siren; Vienna
 Convention, Art. 34); sign numbers of the VzKat, which our own maps use, too.
@@ -17,6 +20,7 @@ from bridgegen.openx.opendrive.lanes import borders, lane_pose, section_index
 from bridgegen.openx.opendrive.legs import governs, signals_on
 from bridgegen.openx.opendrive.model import DRIVABLE, OpenDrive, Road
 from bridgegen.openx.opendrive.routes import Route, Step
+from bridgegen.scenario.countries import country_of
 
 # --- Why one of two participants goes first: the reasons of a claim (`right_of_way.claim`) ---
 
@@ -32,6 +36,9 @@ WAIT = ("205", STOP_SIGN)
 """Signs: give way, stop."""
 PRIORITY = ("301", "306")
 """Signs: right of way at this junction, priority road."""
+
+NOBODY = 1
+"""Claim of each participant against itself where the law has no rule at such a junction."""
 
 THEY_WAIT, NO_RULE, WE_WAIT = 1, 0, -1
 
@@ -123,6 +130,8 @@ def claims(
             elif own is not None and other is not None:
                 found[a, b] = claim(model, own, other, lights)
             found[b, a] = -found[a, b]
+    if any(_nobody_first(road) for road in model.roads):
+        np.fill_diagonal(found, NOBODY)
     return found
 
 
@@ -181,7 +190,15 @@ def _claim(
     if abs(from_theirs) >= math.pi - ASIDE:
         they_turn_left = _turns_left(model, theirs) and not _turns_left(model, ours)
         return ONCOMING if they_turn_left else 0
-    return FROM_THE_RIGHT if from_theirs > ASIDE and not by_lights else 0
+    if by_lights or _nobody_first(model.road(ours.before.road_id)):
+        return 0
+    return FROM_THE_RIGHT if from_theirs > ASIDE else 0
+
+
+def _nobody_first(road: Road) -> bool:
+    """Return whether nobody has priority by law where a road meets others without a sign."""
+    countries = (country_of(kind.country or "") for kind in road.types)
+    return any(country is not None and country.first is None for country in countries)
 
 
 def _waiting(

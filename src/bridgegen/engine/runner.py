@@ -139,6 +139,7 @@ class Runner:
         embedded: the embedded simulator with the storyboard.
         simulator: runs the storyboard; may be ``embedded``.
         refused: why no row of this storyboard makes a scenario; "" if they do.
+        left_hand: whether it is the mirror image of left-hand traffic.
     """
 
     def __init__(
@@ -192,6 +193,7 @@ class Runner:
             driver=self._given_driver,
             vehicle=self._vehicle,
         )
+        self.left_hand = nominal.storyboard.left_hand
         self.embedded = make()
         if (finer := self._choice.finer) > 1:
             self.embedded = make(time_step=self.embedded.time_step / finer)

@@ -14,6 +14,7 @@ from typing import Any
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError, InputError, ScenarioError
+from bridgegen.openx.opendrive.mirror import as_written, right_hand
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
 from bridgegen.openx.openscenario import distributions as dst
@@ -219,9 +220,9 @@ def _roads_of(path: Path, storyboard: osc.OpenScenario, known: dict[Path, RoadFi
             road.name,
             hashlib.sha256(data).hexdigest(),
             data,
-            read_roads(data, str(road), may_be_empty=True),
+            right_hand(read_roads(data, str(road), may_be_empty=True), str(road)),
         )
-    if problems := validate.problems(storyboard, known[road].model):
+    if problems := validate.problems(storyboard, as_written(known[road].model)):
         raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
     return known[road]
 

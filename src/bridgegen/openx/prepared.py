@@ -11,12 +11,14 @@ from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.openx.geo import on_plane
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive.lanes import section_end, section_index
+from bridgegen.openx.opendrive.mirror import as_written, right_hand
 from bridgegen.openx.opendrive.model import Header, OpenDrive
 from bridgegen.openx.opendrive.road_map import map_path
 from bridgegen.openx.opendrive.routes import Stretch, next_stretches
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import Element, rewritten, walk
+from bridgegen.openx.openscenario.mirror import mirrored
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.to_owl.starts import Starts
 from bridgegen.openx.openscenario.values import ParameterRef
@@ -28,12 +30,15 @@ from bridgegen.openx.traffic import populated
 def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
     """Read the map that a scenario file names; one without roads where it names none.
 
+    A map with left-hand traffic is mirrored, and so is its scenario by `prepared`.
+
     Raises:
-        FileFormatError: the map cannot be read.
+        FileFormatError: the map cannot be read, or has both left-hand and right-hand traffic.
     """
     if scenario.road_network.logic_file is None:
         return OpenDrive(Header(1, 7))
-    return opendrive_read.read(logic_path(scenario, path), may_be_empty=True)
+    road = logic_path(scenario, path)
+    return right_hand(opendrive_read.read(road, may_be_empty=True), str(road))
 
 
 def logic_path(scenario: OpenScenario, path: Path) -> Path:
@@ -196,9 +201,11 @@ def _at_its_end(roads: OpenDrive, stretch: Stretch) -> osc.LanePosition:
 def prepared(scenario: OpenScenario, roads: OpenDrive, place: str) -> OpenScenario:
     """Return a scenario without positions on the globe, traffic actions and random routes.
 
+    On a map that was mirrored, it is mirrored, too.
+
     Args:
         scenario: as read.
-        roads: its map.
+        roads: its map, as of `roads_of`.
         place: what to call the scenario in messages.
 
     Raises:
@@ -207,5 +214,8 @@ def prepared(scenario: OpenScenario, roads: OpenDrive, place: str) -> OpenScenar
     """
     # In this order: places on the globe become places of the map, on which traffic is put; and
     # traffic has random routes.
-    whole = populated(on_plane(scenario, roads, place), roads, place)
+    scenario = on_plane(scenario, as_written(roads), place)
+    if roads.left_hand:
+        scenario = mirrored(scenario, place)
+    whole = populated(scenario, roads, place)
     return with_random_routes(whole, roads, place)

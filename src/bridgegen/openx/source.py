@@ -146,6 +146,8 @@ class OntologySource:
         self.constraints = self._scenario = scenario
         odd = watched(scenario, on_map=road_map is not None)
         self._odd = odd.text if odd else ""
+        if road_map is not None:
+            _agree(scenario, road_map)
         self._driver, self._ideal, self._map = driver, ideal, road_map
         static = tuple(
             name for name, parameter in scenario.parameters.items() if parameter.axis is Axis.STATIC
@@ -184,7 +186,9 @@ class OntologySource:
     def road(self) -> str:
         """See `Source`."""
         if self._map is None:
-            return f"generated {self._scenario.roads.template}"
+            roads = self._scenario.roads
+            side = ", traffic on the left" if roads.left_hand else ""
+            return f"generated {roads.template}{side}"
         if self._map.sites:
             places = len({site.place_id for site in self._map.sites})
             if self._map.site.kind is None:
@@ -233,6 +237,8 @@ class OntologySource:
             courses: see `bridgegen.scenario.ontology.individuals.build`.
         """
         site, scenario = self.place(values), self._settled(values)
+        if site and self._map:
+            site = replace(site, left_hand=self._map.model.left_hand)
         if site and self._map and self._map.sites:
             scenario = at_site(scenario, self._map.model, site, int(values[PLACE]))
         if site and road_file:
@@ -268,6 +274,22 @@ def _chosen(participant: Participant, values: Mapping[str, float]) -> Participan
         if participant.place_by
         else participant
     )
+
+
+def _agree(scenario: LogicalScenario, road_map: RoadMap) -> None:
+    """Refuse a map with the other traffic, or of another country, than a scenario states."""
+    roads, model = scenario.roads, road_map.model
+    if roads.left_hand and not model.left_hand:
+        raise InputError(
+            f"{scenario.place}: traffic drives on the left, and on the right on {road_map.path} "
+            "(the rule of its roads is RHT, or not stated)"
+        )
+    there = sorted({kind.country or "none" for road in model.roads for kind in road.types})
+    if roads.country and there != [roads.country]:
+        raise InputError(
+            f"{scenario.place}: rules are those of {roads.country}; the roads of {road_map.path} "
+            f"must state that country in their type, got {', '.join(there) or 'none'}"
+        )
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,7 @@ def moving_picture(
         road: below all, of a view that does not follow.
         lines: likewise where no road is known, such as borders of lanes, ``(n, 2)`` each [m].
     """
+    motion = motion.as_driven()
     # From left to right: the picture is wide.
     start, turn = np.array([motion.x[0, 0, 0], motion.y[0, 0, 0]]), _turn(motion)
     motion = _turned(motion, start, turn)

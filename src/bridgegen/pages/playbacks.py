@@ -11,6 +11,7 @@ from bridgegen.assess.conflict.analysis import Conflicts, analyse
 from bridgegen.assess.conflict.harm import Count
 from bridgegen.assess.conflict.outcomes import with_outcomes
 from bridgegen.assess.conflict.summary import summarise
+from bridgegen.assess.conflict.types import Zone
 from bridgegen.assess.metrics.times import ttc_over_time
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
@@ -23,6 +24,7 @@ from bridgegen.pages.scenery import Scenery, bodies, lamps, vehicle_lamps
 from bridgegen.pages.sensing import sensed
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.scenario.ontology.check import constraints_in_words
+from bridgegen.scenario.ontology.mirror import mirrored
 from bridgegen.scenario.weather import COLUMNS
 from bridgegen.search.triage.record import Minimal
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
@@ -194,6 +196,7 @@ def beside_others(
 
 def _beside(label: str, playback: Playback, rollout: Rollout, row: int) -> Beside:
     """Return the motion of a row, of the entities that move otherwise than in a playback."""
+    rollout = rollout.as_driven()
     motion = {name: getattr(rollout, name)[row].copy() for name in "xyh"}
     motion["x"][:, int(rollout.n_steps[row]) :] = np.nan
     if rollout.present.size:
@@ -269,25 +272,26 @@ def _played(
 ) -> tuple[Playback, ...]:
     """Return the playbacks of rows of one storyboard that were rolled out."""
     rollout, objective = replay.rollout, getattr(pipeline, "objective", None)
+    seen = rollout.as_driven()
     count: Count = objective.count if objective else "ego"
     conflicts = analyse(rollout)
     entities = bodies(rollout, pipeline.runner.bodies(shown[0].x))
     scenery = Scenery(pipeline.runner)
     nearest = rollout.distance.min(axis=1)
-    ttc, detections = ttc_over_time(rollout), sensed(rollout)
-    shows = vehicle_lamps(rollout, pipeline.runner.embedded.program.sirens)
+    ttc, detections = ttc_over_time(rollout), sensed(seen)
+    shows = vehicle_lamps(seen, pipeline.runner.embedded.program.sirens)
     checked = constraints_in_words(pipeline.runner.source.constraints)
     found = []
     for k, item in enumerate(shown):
         concrete = pipeline.runner.concrete(item.x) if not brief else None
-        motion = {name: getattr(rollout, name)[k] for name in "xyhva"}
+        motion = {name: getattr(seen, name)[k] for name in "xyhva"}
         if rollout.present.size:  # who is not there has no place and no speed
             motion |= {name: np.where(rollout.present[k], motion[name], np.nan) for name in "xyva"}
         road = scenery.road(item.x)
         picture = None
         if concrete is not None and concrete.individuals is not None:
             whole = with_outcomes(concrete.individuals, rollout, concrete.roads, k)
-            picture = paint(whole, (), checked)
+            picture = paint(mirrored(whole), (), checked)
         found.append(
             Playback(
                 name=item.name,
@@ -326,12 +330,15 @@ def _conflict(conflicts: Conflicts, row: int, count: Count) -> Conflict | None:
         return None
     other = conflicts.names.index(summary.partner or conflicts.names[0])
     instant = int(conflicts.instant[row, other])
+    zones = [Zone(int(a[row, other])) for a in (conflicts.zone_ego, conflicts.zone_other)]
+    if conflicts.left_hand:
+        zones = [zone.other_side for zone in zones]
     return Conflict(
         summary=summary,
         partner=other,
         instant=instant,
         decided=int(conflicts.decided[row, other]) if summary.happened else instant,
-        zones=(int(conflicts.zone_ego[row, other]), int(conflicts.zone_other[row, other])),
+        zones=(int(zones[0]), int(zones[1])),
     )
 
 
@@ -342,13 +349,14 @@ def _course(replay: Replay, row: int) -> Course | None:
         return None
     number = np.full(max(ways) + 2, -1)  # -1 stays -1
     number[list(ways)] = range(len(ways))
+    side = -1.0 if replay.rollout.left_hand else 1.0
     return Course(
-        ways=tuple(thin(way) for way in ways.values()),
+        ways=tuple(thin(way) * (1.0, side) for way in ways.values()),
         steps=meant.steps,
         way=number[meant.way[row]],
         station=meant.station[row],
         acceleration=meant.acceleration[row],
-        shift=meant.shift[row],
+        shift=meant.shift[row] * (side, side, 1.0, 1.0),
     )
 
 
@@ -364,7 +372,9 @@ def _plans(replay: Replay, row: int) -> tuple[Planned, ...]:
             continue
         time = states[:, 0]
         at = np.linspace(0.0, time[-1], min(PLAN_POINTS, len(time)))
+        side = -1.0 if replay.rollout.left_hand else 1.0
         points = np.stack([np.interp(at, time, states[:, i]) for i in (1, 2)], axis=1)
+        points *= 1.0, side
         found.append(Planned(step, float(time[-1]), points))
     return tuple(found)
 

@@ -22,6 +22,7 @@ from bridgegen.pages.playback_payload import ROAD_SCALE, SCALE, playback_payload
 from bridgegen.pages.playbacks import nominal_playback
 from bridgegen.pages.simulation_payload import simulation_payload
 from bridgegen.pages.sketch import sketch
+from bridgegen.scenario.countries import in_the_mirror
 from bridgegen.scenario.language.parameters import Parameter
 from bridgegen.scenario.language.reader import load as load_scenario
 from bridgegen.scenario.language.scenario import LogicalScenario
@@ -41,12 +42,18 @@ from bridgegen.scenario.language.story import (
 from bridgegen.scenario.named_models import type_of
 from bridgegen.scenario.ontology.check import check, constraints_in_words
 from bridgegen.scenario.ontology.files import load
+from bridgegen.scenario.ontology.mirror import mirrored
 
 # --- What happens in a logical scenario, in sentences ---
 
 
 def story_lines(scenario: LogicalScenario) -> Iterator[str]:
     """Yield the participants, then the events."""
+    told = in_the_mirror if scenario.roads.left_hand else str
+    yield from map(told, _lines(scenario))
+
+
+def _lines(scenario: LogicalScenario) -> Iterator[str]:
     jammed = {name for jam in scenario.story.jams for name in jam.participants}
     for participant in scenario.participants:
         if participant.name not in jammed:
@@ -179,6 +186,7 @@ def write_scenario_page(path: Path, scenario: LogicalScenario, name: str) -> Non
         facts=[
             scenario.name,
             f"template {scenario.roads.template}",
+            *(["traffic on the left"] if scenario.roads.left_hand else []),
             f"ego {pipeline.driver.name}",
             f"{scenario.duration:g} s",
             f"searched: {', '.join(scenario.axes)}",
@@ -297,7 +305,7 @@ def show_file(owl: Path, out: Path | None = None) -> tuple[Path, int]:
     """
     out = out or owl.with_suffix(".html")
     refuse_other(out, GENERATOR, "picture")
-    individuals = load(owl)
+    individuals = mirrored(load(owl))
     scenario = scenario_of(individuals)
     violations = check(individuals, scenario)
     picture = paint(individuals, violations, constraints_in_words(scenario))

@@ -10,6 +10,7 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.kinds import BLUE, BRAKE, BRAKE_LIGHTS_FROM, IS_VEHICLE
 from bridgegen.engine.runner import Runner
 from bridgegen.openx.opendrive.lanes import points
+from bridgegen.openx.opendrive.mirror import as_written
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.outline import Light, Shape, lights, outline
 from bridgegen.openx.opendrive.to_owl.furniture import class_of
@@ -51,7 +52,7 @@ class Scenery:
         # Rows of one road network share one drawing, and a page holds it once.
         key = x[[space.index(name) for name in names]].tobytes()
         if key not in self._known:
-            model = self._runner.concrete(x).roads
+            model = as_written(self._runner.concrete(x).roads)
             found = tuple(Outline(*pair) for pair in _outline(model, source.place(space.values(x))))
             self._known[key] = RoadPicture(found, lights(model), street_lights(model))
         return self._known[key]

@@ -20,7 +20,7 @@ from bridgegen.assess.conflict.plausibility import (
     towed_by_of,
     window_of,
 )
-from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
+from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule, Zone
 from bridgegen.assess.metrics import (
     OF_BASELINE,
     braking,
@@ -37,6 +37,7 @@ from bridgegen.base.physics import GRIP, HARD_BRAKING
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages.packed import deflated
 from bridgegen.pages.storyboard_payload import storyboard_payload
+from bridgegen.scenario.countries import in_the_mirror
 from bridgegen.scenario.language.criteria import PREFIX
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.simulation.adversary import AdversarySource
@@ -99,6 +100,7 @@ def simulation_payload(pipeline: Pipeline, commands: tuple[str, str] = ("", ""))
             raise InputError(f"its road network takes {kilobytes}")
     except InputError as error:
         return {"refused": str(error)}
+    told = in_the_mirror if runner.left_hand else str
     return found | {
         "kernels": _kernels(),
         "space": _space(space),
@@ -108,7 +110,9 @@ def simulation_payload(pipeline: Pipeline, commands: tuple[str, str] = ("", ""))
             "kinds": [KINDS.get(kind, "") for kind in range(codes.VIOLATION + 1)],
             "types": [kind.label for kind in ConflictType],
             "responsible": [who.label for who in Responsible],
-            "rules": [rule.label for rule in Rule],
+            "rules": [told(rule.label) for rule in Rule],
+            "zones": [int(zone.other_side if runner.left_hand else zone) for zone in Zone],
+            "side": -1 if runner.left_hand else 1,
             **_measured(pipeline),
             **_verdict(pipeline),
         },

@@ -31,7 +31,7 @@ def sketch(runner: Runner, x: Float | None = None) -> str:
         shortly afterwards, and as a dashed outline its start.
     """
     x = runner.space.row({}) if x is None else x
-    rollout = runner.run(x[np.newaxis])
+    rollout = runner.run(x[np.newaxis]).as_driven()
     road = Scenery(runner).road(x)
     n = int(rollout.n_steps[0])
     distance = rollout.distance[0].min(axis=0)[:n]

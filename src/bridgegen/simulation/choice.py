@@ -205,6 +205,11 @@ class SimulatorChoice:
                 f"{embedded.program.place}: the vehicle '{vehicle}' is of the embedded simulator; "
                 f"{self.name} moves the ego in its own way (--vehicle {KINEMATIC})"
             )
+        if storyboard.left_hand and self.name not in _OURS:
+            raise InputError(
+                f"{embedded.program.place}: traffic drives on the left, which the simulators "
+                f"{' and '.join(_OURS)} run, got {self.name}"
+            )
         return SIMULATORS[self.name].make(embedded, storyboard, self.settings, self.access)
 
 

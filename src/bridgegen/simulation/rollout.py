@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.base.arrays import Bool, Float, Int, opposite
+from bridgegen.drivers import kinds
 
 STATUS_MESSAGES = {
     0: "ok",
@@ -121,6 +122,8 @@ class Rollout:
             end.
         corridor_of: ``(N,)`` int64, the one of each row; -1 where it is unknown, and where the ego
             has stayed so near to its route that it does not matter. Empty where all are unknown.
+        left_hand: whether it is the mirror image of left-hand traffic; see `as_driven`.
+        country: by whose law it is judged, a code of ISO 3166-1; "" where none is stated.
         messages: details of failures, by row.
         incidents: by row, those that the simulator itself reported.
         derived: intermediate results that several metrics share; see `metrics.metric.shared`.
@@ -158,6 +161,8 @@ class Rollout:
     transitions: Int = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     corridors: Float = field(default_factory=lambda: np.zeros((0, 0, 8)))
     corridor_of: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    left_hand: bool = False
+    country: str = ""
     messages: Mapping[int, str] = field(default_factory=dict)
     incidents: Mapping[int, tuple[Incident, ...]] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -215,6 +220,26 @@ class Rollout:
     def coupled(self, a: int, b: int) -> bool:
         """Return whether one of two entities tows the other some time."""
         return bool(len(self.towed_by)) and (self.towed_by[a] == b or self.towed_by[b] == a)
+
+    def as_driven(self) -> "Rollout":
+        """Return the motion in the world: with left-hand traffic, y and left are not mirrored.
+
+        What is measured and judged is `Rollout` itself, which drives on the right.
+        """
+        if not self.left_hand:
+            return self
+        changed: dict[str, Any] = {n: opposite(getattr(self, n)) for n in ("y", "h", "offset")}
+        seen = opposite(self.detections, columns=(kinds.Y, kinds.HEADING))
+        lines = opposite(self.stop_lines, columns=(1, 2))
+        return replace(
+            self,
+            **changed,
+            detections=seen,
+            stop_lines=lines,
+            crosswalks=opposite(self.crosswalks, columns=(1, 2)),
+            lamps=kinds.other_side(self.lamps),
+            left_hand=False,
+        )
 
     def take(self, at: Int) -> "Rollout":
         """Return some of the scenarios, in the order of their positions ``at``."""

@@ -38,6 +38,7 @@ def write_trace(path: Path, rollout: Rollout, row: int = 0) -> None:
 
 
 def _lines(rollout: Rollout, row: int) -> Iterator[str]:
+    rollout = rollout.as_driven()
     yield ",".join((*COLUMNS, *MORE)) + "\r\n"
     names = [_quoted(name) for name in rollout.names]
     boxes = [",".join(repr(size) for size in box) for box in rollout.box.tolist()]

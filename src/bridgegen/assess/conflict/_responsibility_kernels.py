@@ -61,6 +61,7 @@ from bridgegen.assess.conflict._codes import (
     MAP_PRIORITY,
     NEEDED,
     NEITHER,
+    NO_PRIORITY,
     OBJECT,
     OTHER,
     PASSED_TOO_CLOSE,
@@ -691,6 +692,8 @@ def of_crossing(scene, e, k, own, risk, seen, avoidable, whole):
         if mine != its:
             return (EGO if mine else OTHER), TURNING_GIVES_WAY
         return SHARED, TURNING_GIVES_WAY
+    if scene.claims[0] != 0:  # of the ego against itself: the law of the country has no rule
+        return SHARED, NO_PRIORITY
     j = max(k - int(TURN_TIME / scene.dt), scene.first)
     from_right = scene.c[0, j] * scene.s[e, j] - scene.s[0, j] * scene.c[e, j] > 0.0
     return (EGO if from_right else OTHER), ASSUMED_RIGHT_BEFORE_LEFT

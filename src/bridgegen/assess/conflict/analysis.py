@@ -98,6 +98,8 @@ class Conflicts:
             else 0.
         breach: ``(N, E)`` in [0, 1], of a violation: 1 where it is a failure; else 0.
         body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own.
+        left_hand: whether it happened in the mirror image of left-hand traffic.
+        country: by whose law it is judged, a code of ISO 3166-1; "" where none is stated.
     """
 
     names: tuple[str, ...]
@@ -131,6 +133,8 @@ class Conflicts:
     body: Int
     aside: Float
     breach: Float
+    left_hand: bool = False
+    country: str = ""
 
     @cached_property
     def at_fault(self) -> Bool:
@@ -269,6 +273,8 @@ def _of_one_body(rollout: Rollout, kernel: Callable[..., None] | None) -> Confli
         body=np.zeros((n, e), np.int64),
         aside=np.zeros((n, e)),
         breach=breach,
+        left_hand=rollout.left_hand,
+        country=rollout.country,
     )
 
 

@@ -13,6 +13,7 @@ from bridgegen.assess.conflict.harm import NEAR_MISS as SERIOUS
 from bridgegen.assess.conflict.harm import Count, decisive
 from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
 from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.scenario.countries import in_the_mirror
 
 KINDS = {
     COURSE: "collision course",
@@ -111,7 +112,10 @@ class Findings:
                 words(conflicts.responsible, [responsible.label for responsible in Responsible]),
                 "",
             ),
-            words(conflicts.rule, [rule.label for rule in Rule]),
+            words(
+                conflicts.rule,
+                [in_the_mirror(r.label) if conflicts.left_hand else r.label for r in Rule],
+            ),
             np.where(conflicts.kind[rows, other] >= COURSE, names[other], ""),
             np.array(implausible, dtype=object).reshape(len(other)),
             np.zeros(0, dtype=object) if happened is None else happened,

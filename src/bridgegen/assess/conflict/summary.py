@@ -18,6 +18,7 @@ from bridgegen.assess.conflict.findings import KINDS
 from bridgegen.assess.conflict.harm import Count, decisive, harm_of_pairs
 from bridgegen.assess.conflict.types import RULES, ConflictType, Responsible, Rule, Zone
 from bridgegen.base.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
+from bridgegen.scenario.countries import country_of, in_the_mirror
 
 # --- A conflict in one sentence: the parties, responsibility, its rule, and the time left ---
 # The sentence depends on the numbers of `Conflicts` alone.
@@ -45,6 +46,7 @@ _BY_NEITHER = {
 _BY_BOTH = {
     Rule.RED_LIGHT: "they crossed their stop lines at red",
     Rule.TURNING_GIVES_WAY: "both turned",
+    Rule.NO_PRIORITY: "nobody has priority there by law, and neither gave way",
 }
 
 
@@ -368,7 +370,7 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
             "aside",
         )
     }
-    return ConflictSummary(
+    found = ConflictSummary(
         conflict=KINDS[kind],
         sentence=sentence(conflicts, row, other),
         avoidance=avoidance(conflicts, row, other),
@@ -388,3 +390,21 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
         harm=float(harm_of_pairs(conflicts, count)[row, other]),
         **numbers,
     )
+    return _by_law(found, rule, conflicts)
+
+
+_BY_SIDE = (Rule.RIGHT_BEFORE_LEFT, Rule.ASSUMED_RIGHT_BEFORE_LEFT)
+_SAID = ("sentence", "avoidance", "rule", "rule_says", "zone_ego", "zone_other")
+
+
+def _by_law(found: ConflictSummary, rule: Rule, conflicts: Conflicts) -> ConflictSummary:
+    """Return a conflict on the side on which it happened, with the law of its country."""
+    country = country_of(conflicts.country)
+    law = country.source if country else f"as in a mirror: {found.rule_source}"
+    if rule in _BY_SIDE and (country or conflicts.left_hand):
+        sentence = found.sentence.replace(f"({found.rule_source})", f"({law})")
+        found = replace(found, rule_source=law, sentence=sentence)
+    if not conflicts.left_hand:
+        return found
+    texts: dict[str, Any] = {name: in_the_mirror(getattr(found, name)) for name in _SAID}
+    return replace(found, **texts, aside=found.aside if found.partner else -found.aside)

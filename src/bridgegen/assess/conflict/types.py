@@ -9,6 +9,7 @@ from enum import IntEnum
 
 from bridgegen.assess.conflict import _codes
 from bridgegen.base.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
+from bridgegen.scenario.countries import COUNTRIES, in_the_mirror
 
 
 class ConflictType(IntEnum):
@@ -99,6 +100,11 @@ class Zone(IntEnum):
             return f"{words} side"
         return f"{words} corner" if " " in words else words
 
+    @property
+    def other_side(self) -> "Zone":
+        """The same edge or corner in the mirror."""
+        return Zone[in_the_mirror(self.name.replace("_", " ")).upper().replace(" ", "_")]
+
 
 class Responsible(IntEnum):
     """The party responsible for a conflict."""
@@ -148,6 +154,7 @@ class Rule(IntEnum):
     LEFT_THE_ROAD = _codes.LEFT_THE_ROAD
     CUT_IN_REQUIRED = _codes.CUT_IN_REQUIRED
     REVERSED = _codes.REVERSED
+    NO_PRIORITY = _codes.NO_PRIORITY
 
     @property
     def label(self) -> str:
@@ -266,6 +273,10 @@ RULES = {
     Rule.REVERSED: (
         "reversed towards the other, or across its way",
         "Vienna Convention, Art. 14 (2); StVO § 9 (5)",
+    ),
+    Rule.NO_PRIORITY: (
+        "drove on where nobody has priority by law",
+        COUNTRIES["UK"].source,
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",

@@ -160,7 +160,7 @@ def _of_file(scenario: FileScenario) -> set[str]:
 def _facts_of_map(roads: OpenDrive) -> set[str]:
     facts = {"traffic lane"} if roads.roads else set()
     for road in roads.roads:
-        facts.add("left-hand traffic" if road.rule == "LHT" else "right-hand traffic")
+        facts.add(f"{'left' if roads.left_hand else 'right'}-hand traffic")
         facts |= {_ROAD_TYPES[kind.type] for kind in road.types if kind.type in _ROAD_TYPES}
         facts |= _facts_of_lanes(road)
     return facts

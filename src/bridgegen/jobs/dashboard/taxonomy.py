@@ -123,7 +123,7 @@ _GROUPS: Mapping[str, Mapping[str, str]] = {
         "cycle lanes": "",
         "tram lanes": "",
         "right-hand traffic": "right-hand traffic",
-        "left-hand traffic": "left-hand traffic # only on OpenDRIVE maps",
+        "left-hand traffic": "left-hand traffic",
     },
     "Scenery / Drivable area / Lane marking": {
         "clear": "marked # all lines are clear",

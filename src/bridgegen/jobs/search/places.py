@@ -7,6 +7,7 @@ from bridgegen.base.errors import BridgeGenError, UnsupportedError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.on_map import on_map, searchable
 from bridgegen.openx.opendrive.merges import merges
+from bridgegen.openx.opendrive.mirror import as_written, right_hand
 from bridgegen.openx.opendrive.model import Junction, OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.rings import Ring, rings
@@ -65,7 +66,7 @@ def places_of(
         path, _ = map_of(path)
     data = read_bytes(path)
     warnings: list[str] = []
-    model = read(data, str(path), warnings)
+    model = right_hand(read(data, str(path), warnings), str(path))
     found: list[PlaceFit] = []
     wanted = None if scenario is None else kind_of_place(scenario)
     if wanted in (None, "junction"):
@@ -84,7 +85,7 @@ def places_of(
         for i, fit in enumerate(found):
             rotations, placed, lacks = _fit(fit, scenario, model, data, path, known.get(fit.id))
             found[i] = replace(fit, rotations=rotations, placed=placed, lacks=lacks)
-    return found, model, warnings
+    return found, as_written(model), warnings
 
 
 def _junction(model: OpenDrive, junction: Junction) -> PlaceFit:

@@ -147,6 +147,7 @@ def _roads(path: Path, warnings: list[str] | None) -> list[str]:
 
 def _storyboard(path: Path, warnings: list[str] | None) -> list[str]:
     from bridgegen.openx.file_scenario import load_file_scenario
+    from bridgegen.openx.opendrive.mirror import as_written
     from bridgegen.openx.openscenario import read as openscenario_read
     from bridgegen.openx.openscenario import validate as openscenario_validate
     from bridgegen.openx.openscenario.distributions import is_distribution, read_distribution
@@ -161,7 +162,7 @@ def _storyboard(path: Path, warnings: list[str] | None) -> list[str]:
         return []
     odd: list[str] = []
     scenario = openscenario_read.read(path, warnings=odd)
-    problems = openscenario_validate.problems(scenario, roads_of(scenario, path))
+    problems = openscenario_validate.problems(scenario, as_written(roads_of(scenario, path)))
     if warnings is None:
         return [*odd, *problems]
     warnings += odd

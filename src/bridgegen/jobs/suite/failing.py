@@ -98,7 +98,8 @@ def ways(pipeline: Pipeline, X: Float) -> list[Way]:
         ids = ", ".join(violate["id"] for violate in violates)
         words = f"violates {ids}"
         if key is not NO_KEY:
-            words = title(key, [rule], pipeline.objective.count)
+            left = pipeline.runner.left_hand
+            words = title(key, [rule], pipeline.objective.count, left_hand=left)
         made.append(Way(key, rule, violates, metrics, harm, words, pipeline.driver.label, problem))
     return made
 

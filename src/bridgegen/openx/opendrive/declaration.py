@@ -130,6 +130,8 @@ def plan(cls: type) -> tuple[Field, ...]:
     hints = get_type_hints(cls)
     found = []
     for item in fields(cls):
+        if "form" not in item.metadata:  # no part of a file
+            continue
         form: Form = item.metadata["form"]
         types = _types(hints[item.name])
         found.append(

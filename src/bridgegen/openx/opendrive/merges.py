@@ -32,8 +32,7 @@ class _End:
 def merges(model: OpenDrive, map_name: str | None = None) -> Iterator[Site]:
     """Yield the entries of a map: a carriageway, a ramp of one lane to its right, and what follows.
 
-    The ramp's lane goes on to the right of all lanes that the carriageway's lead to. Where traffic
-    drives on the left, entries are not looked for: a scenario's lane changes would be mirrored.
+    The ramp's lane goes on to the right of all lanes that the carriageway's lead to.
 
     Args:
         model: the road network.
@@ -76,7 +75,7 @@ def through(model: OpenDrive, site: Site) -> float:
 def _ends(model: OpenDrive, junction: Junction) -> Iterator[_End]:
     """Yield the ends of roads from which traffic enters a junction."""
     for road in model.roads:
-        if road.is_connecting or road.rule == "LHT":
+        if road.is_connecting:
             continue
         for end in road.ends_at(junction.id):
             lanes = [

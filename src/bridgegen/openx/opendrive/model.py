@@ -314,12 +314,18 @@ class Header:
 
 @dataclass(frozen=True)
 class OpenDrive:
-    """A road network."""
+    """A road network.
+
+    Attributes:
+        left_hand: whether it is the mirror image of one with left-hand traffic, which is written:
+            see `bridgegen.openx.opendrive.mirror`.
+    """
 
     header: Header = only_child("header", fallback=Header(1, 4))
     roads: tuple[Road, ...] = children("road")
     controllers: tuple[Controller, ...] = children("controller")
     junctions: tuple[Junction, ...] = children("junction")
+    left_hand: bool = False
 
     def road(self, road_id: str) -> Road:
         """Return a road by its id.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bridgegen.base.errors import FileFormatError
+from bridgegen.openx.opendrive.mirror import right_hand
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.site import find_site
@@ -64,7 +65,7 @@ class RoadMap:
     Attributes:
         path: of the file.
         data: its bytes, exported unchanged.
-        model: its contents.
+        model: its contents, mirrored where traffic drives on the left.
         site: the junction or the stretch of road.
         warnings: what was not read as it stands.
         sites: all that are searched together, the site first; empty where it is alone.
@@ -118,7 +119,7 @@ def load_map(
             "import it again"
         )
     warnings: list[str] = []
-    model = read(data, str(path), warnings)
+    model = right_hand(read(data, str(path), warnings), str(path))
     sites: list[Site] = []
     others: list[Site] = []
     if scenario is not None and junction == ALL:

@@ -60,9 +60,6 @@ def turned_sites(
 ) -> list[Site]:
     """Return a junction once per rotation of its legs' names, that most like a scenario's first.
 
-    Where traffic drives on the left, the scenario's order of legs is mirrored, so that its left
-    turns become right turns.
-
     Args:
         model: as for `find_site`, which says what is raised, too.
         junction_id: as for `find_site`.
@@ -117,10 +114,6 @@ def _turned(
             f"as the scenario has ({', '.join(headings)}), got {len(ends)} "
             f"(roads {roads or 'none'})"
         )
-    # Only where traffic drives on the left: mirrored on a road with traffic on the right, a car
-    # from the right would come from the left, and other rules of priority would hold.
-    if all(road.rule == "LHT" for road, _ in ends):
-        headings = {leg: 180.0 - angle for leg, angle in headings.items()}
     names = sorted(headings, key=lambda leg: headings[leg] % 360.0)
     arms = {id(end): _arm(model, *end) for end in ends}
     sites = []

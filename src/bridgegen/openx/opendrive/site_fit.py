@@ -128,29 +128,21 @@ def _no_way(
     if start.leg == end.leg:
         return ""
     way = f"{name} from leg {start.leg} to leg {end.leg}"
-    if site.kind != "Merge" and (turn := _turn_off(scenario, model, site, start, end)):
+    if site.kind != "Merge" and (turn := _turn_off(scenario, site, start, end)):
         return f"{way} must turn as in the scenario, and turns by {turn:.0f}° more or less"
     if not has_way(model, site, start, end):
         return f"{way}: no way from lane {start.lane} to lane {end.lane}"
     return ""
 
 
-def _turn_off(
-    scenario: LogicalScenario, model: OpenDrive, site: Site, start: Waypoint, end: Waypoint
-) -> float:
+def _turn_off(scenario: LogicalScenario, site: Site, start: Waypoint, end: Waypoint) -> float:
     """Return by how much a turn differs from the scenario's [deg]; 0 where it is alike."""
     there = {leg.name: leg.heading_deg for leg in site.legs}
     angle = there[end.leg] - there[start.leg]
     legs = scenario.roads.legs
     wanted = legs[end.leg].heading - legs[start.leg].heading
-    if _is_lht(model, site):
-        wanted = -wanted
     off = math.remainder(angle - wanted, 360.0)
     return off if abs(off) > TURN_TOLERANCE else 0.0
-
-
-def _is_lht(model: OpenDrive, site: Site) -> bool:
-    return all(model.road(leg.roads[0].road_id).rule == "LHT" for leg in site.legs)
 
 
 def ends_of(scenario: LogicalScenario) -> Iterator[Waypoint]:

@@ -6,18 +6,19 @@ from lxml import etree
 
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.declaration import plan
+from bridgegen.openx.opendrive.mirror import as_written
 from bridgegen.openx.opendrive.model import OpenDrive
 
 
 def to_xml(model: OpenDrive) -> bytes:
-    """Return the text of a road network.
+    """Return the text of a road network; a mirrored one is mirrored back.
 
     Raises:
         InputError: a name holds a character that XML cannot.
     """
     root = etree.Element("OpenDRIVE")
     try:
-        _fill(root, model)
+        _fill(root, as_written(model))
     # lxml refuses what XML has no characters for (NUL, lone surrogates); names come from users.
     except ValueError as error:
         raise InputError(f"the road network cannot be written as XML: {error}") from None

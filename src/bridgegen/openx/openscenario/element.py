@@ -217,7 +217,7 @@ def _declare(cls: type[Element]) -> Declaration:
     children: list[Child] = []
     text = None
     for item in fields(cls):
-        if item.name == "line":
+        if item.name in ("line", "left_hand"):  # no part of a file
             continue
         options, marks, many = _unfold(hints[item.name])
         required = type(None) not in options

@@ -178,7 +178,12 @@ class Storyboard(Element):
 
 @dataclass(frozen=True)
 class OpenScenario(Element):
-    """A scenario file."""
+    """A scenario file.
+
+    Attributes:
+        left_hand: whether it is the mirror image of one with left-hand traffic, which is written:
+            see `bridgegen.openx.openscenario.mirror`.
+    """
 
     file_header: FileHeader
     parameter_declarations: ParameterDeclarations | None = field(default=None, kw_only=True)
@@ -188,3 +193,4 @@ class OpenScenario(Element):
     road_network: RoadNetwork
     entities: Entities
     storyboard: Storyboard
+    left_hand: bool = field(default=False, kw_only=True)

@@ -19,6 +19,7 @@ from bridgegen.openx.openscenario.element import (
     values_of,
     walk,
 )
+from bridgegen.openx.openscenario.mirror import mirrored
 from bridgegen.openx.openscenario.storyboard import OpenScenario
 from bridgegen.openx.openscenario.values import ParameterRef, format_value
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def to_xml(scenario: "OpenScenario | DistributionFile") -> bytes:
-    """Return the file: UTF-8, indented, the same bytes for the same model.
+    """Return the file: UTF-8, indented, the same bytes for the same model; mirrored back if it was.
 
     Numbers are written so that reading gives the same double back. A file of version 1.0 has what
     later versions wrap (a trajectory, in a ``TrajectoryRef``) bare.
@@ -37,6 +38,8 @@ def to_xml(scenario: "OpenScenario | DistributionFile") -> bytes:
         ValueError: NaN, a text that XML or the standard cannot hold, or too few children.
     """
     root = etree.Element("OpenSCENARIO")
+    if isinstance(scenario, OpenScenario) and scenario.left_hand:
+        scenario = mirrored(scenario)
     fill(root, "OpenSCENARIO", scenario, bare=scenario.file_header.rev_minor == 0)
     # The same model gives the same bytes: nothing here depends on the date, on ids of the process
     # or on the order of a set.

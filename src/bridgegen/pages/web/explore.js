@@ -36,12 +36,13 @@ function simulator() {
 function playbackOf(base, simulator, values) {
   const { steps, status } = simulator.run(values);
   const { shape } = simulator.at.record.x, [count, length] = shape;
-  const rows = (name) => {
+  // Where traffic drives on the left, what is simulated is its mirror image.
+  const rows = (name, side = 1) => {
     const all = simulator.array("record", name);
-    return Array.from({ length: count }, (_, e) => Array.from(all.subarray(e * length, e * length + steps)));
+    return Array.from({ length: count }, (_, e) => Array.from(all.subarray(e * length, e * length + steps), (value) => side * value));
   };
   const made = {
-    ...base, x: rows("x"), y: rows("y"), h: rows("h"), v: rows("v"), a: rows("a"), n_steps: steps, ttc: null, tried: true,
+    ...base, x: rows("x"), y: rows("y", labels.side), h: rows("h", labels.side), v: rows("v"), a: rows("a"), n_steps: steps, ttc: null, tried: true,
     players: undefined, conflict: null, distance: null, sensed: null, course: null, plans: [], planAt: new Int32Array(steps).fill(-1), beside: [], lamps: lampsOf(base, simulator, steps),
     weather: values === base.parameters ? base.weather : [], // its words are of other values
   };
@@ -86,7 +87,7 @@ function conflictOf(made, simulator) {
   return {
     conflict: kind, counts, type: words("types", "type"), responsible: words("responsible", "responsible"), rule: words("rules", "rule"),
     partner: e ? made.entities[e].name : "", partner_number: e, instant: read(e, "instant"), decided: read(e, "decided"),
-    zones: [read(e, "zone_ego"), read(e, "zone_other")], severity: simulator.array("verdict", "severity")[e],
+    zones: [labels.zones[read(e, "zone_ego")], labels.zones[read(e, "zone_other")]], severity: simulator.array("verdict", "severity")[e],
   };
 }
 

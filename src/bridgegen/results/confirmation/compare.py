@@ -73,6 +73,7 @@ def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0, partner: str 
         j: a row of ``there`` that has not failed.
         partner: the entity whose closest approach to the ego is reported; the closest by default.
     """
+    here, there = here.as_driven(), there.as_driven()
     times = _instants(here, there, i, j)
     step = max(here.time_step, there.time_step)
     bodies = _shared(here, there)
@@ -108,6 +109,7 @@ def tracks(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> tuple[Track
         i: see ``compare``.
         j: see ``compare``.
     """
+    here, there = here.as_driven(), there.as_driven()
     n = min(int(here.n_steps[i]), int((_end(there, j) + _EPSILON) / here.time_step) + 1)
     times = np.arange(n, dtype=np.float64) * here.time_step
     found = []

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bridgegen.base.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
+from bridgegen.scenario.countries import COUNTRIES, in_the_mirror
 from bridgegen.scenario.language.adversary import DRIVERS, SCRIPTED, driven
 from bridgegen.scenario.language.checks import NEEDED, time_problems, try_out, use_problems
 from bridgegen.scenario.language.constraints import problems_of
@@ -502,10 +503,18 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     given = section(ScenarioFile, document.data)
     if problems or given is None or objective is None:
         raise ScenarioError(*problems)
+    if roads.left_hand:
+        said = {name: _told(item) for name, item in parameters.items()}
+        declarations.derived = [_told(item) for item in declarations.derived]
+        declarations.bounds = [
+            replace(bound, why=in_the_mirror(bound.why)) for bound in declarations.bounds
+        ]
+        parameters = said
+    told = in_the_mirror if roads.left_hand else str
     scenario = LogicalScenario(
         name=given.scenario,
-        title=given.title,
-        description=given.description,
+        title=told(given.title),
+        description=told(given.description),
         source=given.source,
         place=document.place,
         duration=given.duration,
@@ -531,6 +540,14 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     return scenario
 
 
+Told = TypeVar("Told", Parameter, Derived)
+
+
+def _told(item: Told) -> Told:
+    """Return a parameter with its description in the mirror."""
+    return replace(item, description=in_the_mirror(item.description))
+
+
 def _objective(data: Any, quantities: Quantities) -> ObjectiveSpec | None:
     """Return what the file optimises; None if that is not of the right shape."""
     if data in ("harm", "paper"):
@@ -547,7 +564,7 @@ def _roads(document: Document, quantities: Quantities) -> RoadsSpec | None:
     given = section(RoadsSection, data.get("roads", {}))
     if kind is None or given is None:
         return None
-    return read_roads(
+    roads = read_roads(
         kind,
         given,
         quantities.parameters,
@@ -555,3 +572,12 @@ def _roads(document: Document, quantities: Quantities) -> RoadsSpec | None:
         quantities.declared,
         quantities.report,
     )
+    country = COUNTRIES.get(str(data.get("rules")))
+    side = data.get("traffic") or (country.traffic if country else "right")
+    if country and side != country.traffic:
+        quantities.report(
+            f"traffic must be {country.traffic}, as the rules of {data['rules']} have it, "
+            f"got {side}",
+            ("traffic",),
+        )
+    return replace(roads, left_hand=side == "left", country=country.code if country else "")

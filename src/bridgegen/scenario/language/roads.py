@@ -163,6 +163,8 @@ class RoadsSpec:
         crosswalk_at: of a road: where its crosswalk's centre lies [m], None for none.
         signals: traffic lights at the junction: none, or a phase for each pair of opposite legs.
         road_type: what kind of road it is.
+        left_hand: whether traffic drives on the left: then this is its mirror image.
+        country: by whose law priority is judged, a code of ISO 3166-1; "": none is stated.
     """
 
     template: Template
@@ -172,13 +174,16 @@ class RoadsSpec:
     crosswalk_at: float | None = None
     signals: Literal["none", "two-phase"] = "none"
     road_type: RoadType = "town"
+    left_hand: bool = False
+    country: str = ""
 
     def __repr__(self) -> str:
         """Return its contents in canonical form, for a scenario's fingerprint."""
+        more = f", {self.left_hand!r}, {self.country!r}" if self.left_hand or self.country else ""
         return (
             f"RoadsSpec({self.template!r}, {dict(sorted(self.knobs.items()))!r}, "
             f"{dict(sorted(self.legs.items()))!r}, {self.segments!r}, {self.crosswalk_at!r}, "
-            f"{self.signals!r}, {self.road_type!r})"
+            f"{self.signals!r}, {self.road_type!r}{more})"
         )
 
     @property

@@ -264,6 +264,12 @@ class ScenarioFile(ShapedSection):
     """Kind of road network (layers 1 and 2)."""
     roads: RoadsSection = RoadsSection()
     """Dimensions and rules of the road network."""
+    traffic: Literal["right", "left"] | None = None
+    """Side on which traffic drives, right by default; left: the scenario happens in a mirror, its
+    right is the nearside and its left the offside."""
+    rules: Literal["DE", "JP", "UK", "US"] | None = None
+    """Country by whose law it is judged, see docs/conflicts.md; German law by default, or on the
+    left its mirror image."""
     driver: Word = "route-follower"
     """Default driver of the ego (see --ego and 'bridgegen list drivers')."""
     others: Literal["attentive", "insistent", "scripted"] = "scripted"

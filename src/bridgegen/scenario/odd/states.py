@@ -415,7 +415,12 @@ def kind_of(name: str) -> str:
 def facts_of_roads(roads: RoadsSpec) -> set[str]:
     """Return the facts of a scenario's roads."""
     template, knobs = roads.template, roads.knobs
-    facts = {"traffic lane", "marked", "right-hand traffic", roads.road_type}
+    facts = {
+        "traffic lane",
+        "marked",
+        f"{'left' if roads.left_hand else 'right'}-hand traffic",
+        roads.road_type,
+    }
     facts |= {"slip road", "divided"} if template == "merge" else set()
     if template in ("crossroads", "t-junction"):
         facts |= {template, "undivided"}

@@ -16,6 +16,7 @@ import pyoxigraph as ox
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import FileFormatError
 from bridgegen.scenario.ontology.graph import Individuals, as_number
+from bridgegen.scenario.ontology.mirror import mirrored
 from bridgegen.scenario.ontology.vocabulary import (
     DOUBLE,
     INTEGER,
@@ -57,7 +58,7 @@ def to_bytes(individuals: Individuals, include_tbox: bool = True) -> bytes:
     """Return what `save` writes: the same bytes for the same statements in the same order."""
     header: ox.NamedNode | ox.BlankNode | ox.Triple = ox.NamedNode(SCENARIOS + "unnamed")
     by_subject: dict[object, list[ox.Quad]] = {}
-    for quad in individuals.quads:
+    for quad in mirrored(individuals).quads:
         if quad.predicate == TYPE and quad.object == OWL_ONTOLOGY:
             header = quad.subject
         by_subject.setdefault(quad.subject, []).append(quad)
@@ -125,7 +126,7 @@ def from_bytes(data: bytes, place: str = "document") -> Individuals:
             raise FileFormatError(
                 f"{place}: the type of {quad.subject} must be a class, got '{quad.object.value}'"
             )
-    return Individuals(_typed(quad) for quad in _without_tbox(quads))
+    return mirrored(Individuals(_typed(quad) for quad in _without_tbox(quads)))
 
 
 def _check_xml(data: bytes, place: str) -> None:

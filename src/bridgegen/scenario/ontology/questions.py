@@ -19,6 +19,7 @@ import pyoxigraph as ox
 from bridgegen.base.errors import FileFormatError, InputError, UnknownNameError
 from bridgegen.scenario.ontology.files import load
 from bridgegen.scenario.ontology.graph import Individuals, as_number
+from bridgegen.scenario.ontology.mirror import mirrored
 from bridgegen.scenario.ontology.vocabulary import BG, INTEGER, PREFIXES, RDF, local_name, tbox
 
 MAX_ROWS = 10_000
@@ -147,7 +148,7 @@ def ask_file(owl: Path, question: str | None = None, sparql: Path | None = None)
     """
     if question is not None and sparql is not None:
         raise InputError(f"ask either '{question}' or --sparql {sparql}, not both")
-    individuals = load(owl)
+    individuals = mirrored(load(owl))
     if sparql is not None:
         return ask_sparql(individuals, _read(sparql))
     if question is not None:

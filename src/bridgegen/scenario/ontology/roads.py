@@ -34,6 +34,10 @@ def add_road_network(builder: Builder, site: Site) -> ox.NamedNode:
     put(network, "has_name", site.name)
     if site.map_file is not None:
         put(network, "has_map_file", site.map_file)
+    if site.left_hand:
+        put(network, "has_driving_side", "left")
+    if site.country:
+        put(network, "has_country", site.country)
     crossing: ox.NamedNode | None = None
     if site.kind is not None:
         crossing = builder.node("intersection", site.kind)

@@ -232,6 +232,8 @@ class Site:
         facilities: what stands and lies on the legs.
         phases: of the traffic lights, in their order; empty: none.
         signal_offset: time of the signals' cycle that has passed at time 0 [s].
+        left_hand: whether traffic drives on the left: then this is its mirror image.
+        country: by whose law priority is judged, see `RoadsSpec`.
     """
 
     name: str
@@ -244,6 +246,8 @@ class Site:
     facilities: tuple[Facility, ...] = ()
     phases: tuple[Phase, ...] = ()
     signal_offset: float = 0.0
+    left_hand: bool = False
+    country: str = ""
 
     def leg(self, name: str) -> Leg | None:
         """Return a leg by name, or None."""

@@ -108,6 +108,8 @@ class _Template:
             facilities=facilities,
             phases=tuple(phases_of(self.roads, headings)),
             signal_offset=self.knobs.get("signal_offset", 0.0),
+            left_hand=self.roads.left_hand,
+            country=self.roads.country,
         )
 
     # -- legs ----------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ import numpy as np
 from bridgegen.assess.conflict.findings import Findings
 from bridgegen.assess.conflict.types import RULES, ConflictType, Rule
 from bridgegen.base.arrays import Float, Int
+from bridgegen.scenario.countries import in_the_mirror
 
 APART = 0.25
 """Least distance between clusters: root mean square over the searched parameters, 0 to 1."""
@@ -211,7 +212,9 @@ def by_frequency(rules: Iterable[str]) -> tuple[tuple[str, int], ...]:
     return tuple(sorted(counts.items(), key=lambda pair: (-pair[1], pair[0])))
 
 
-def title(key: Key, rules: Sequence[str] = (), count: str = "ego") -> str:
+def title(
+    key: Key, rules: Sequence[str] = (), count: str = "ego", *, left_hand: bool = False
+) -> str:
     """Return a mode's key in words, without its cause.
 
     Args:
@@ -219,7 +222,10 @@ def title(key: Key, rules: Sequence[str] = (), count: str = "ego") -> str:
         rules: labels of the rules that occur, the most frequent first; see `Rule`.
         count: whose conflicts count, "ego" or "any": with the latter the ego need not be able to
             prevent them.
+        left_hand: whether traffic drives on the left; then the labels are those of that side.
     """
+    if left_hand:
+        return in_the_mirror(title(key, [*map(in_the_mirror, rules)], count))
     kinds = {type_.label: type_ for type_ in ConflictType}
     contact, near = _TITLES[kinds.get(key.conflict_type, ConflictType.NONE)]
     partner = _ARTICLES.get(key.partner, f"a {key.partner}")

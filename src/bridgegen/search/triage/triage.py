@@ -521,7 +521,8 @@ class _Triage:
 
     def _title(self, item: Group, groups: Sequence[Group], rules: Sequence[str]) -> str:
         """Return a mode in words; a cluster also with the parameter that separates it."""
-        text = title(item.key, rules, self._pipeline.objective.count)
+        left = self._pipeline.runner.left_hand
+        text = title(item.key, rules, self._pipeline.objective.count, left_hand=left)
         others = [g.rows for g in groups if g is not item and g.key == item.key]
         if not item.part or not others:
             return text

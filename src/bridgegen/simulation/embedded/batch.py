@@ -278,6 +278,11 @@ class Batch:
         tables, rows = self._roads.tables, self._rows
         see_conflicts_of_rows(k, self.plan, tables, rows, self.state, self.record, found)
 
+    @property
+    def left_hand(self) -> bool:
+        """Whether it is the mirror image of left-hand traffic."""
+        return self._roads.left_hand
+
     def maps(self) -> tuple[tuple[RoadMap, ...], Int]:
         """Return the road maps of the rows, and which of them each row has, ``(N,)``."""
         used, of = np.unique(self._rows, return_inverse=True)
@@ -347,6 +352,8 @@ class Batch:
             transitions=self._transitions(),
             corridors=corridors,
             corridor_of=corridor_of,
+            left_hand=roads.left_hand,
+            country=roads.country,
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
             status=self.state.ending[:, memory.STATUS].astype(np.int8),
             messages=self._messages,

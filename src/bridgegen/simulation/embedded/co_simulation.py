@@ -193,6 +193,11 @@ class CoSimulation:
         """End it, if it runs, with a status of `STATUS_MESSAGES` and what else there is to say."""
         self._batch.fail(status, message)
 
+    @property
+    def left_hand(self) -> bool:
+        """Whether it is the mirror image of left-hand traffic."""
+        return self._batch.left_hand
+
     def rollout(self) -> Rollout:
         """Return what is recorded, N = 1; it must have ended."""
         return self._batch.rollout()

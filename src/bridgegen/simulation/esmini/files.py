@@ -16,7 +16,7 @@ from shutil import rmtree
 import numpy as np
 from lxml import etree
 
-from bridgegen.base.arrays import Float
+from bridgegen.base.arrays import Float, opposite
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -88,6 +88,7 @@ class ScenarioFile:
     """
 
     def __init__(self, storyboard: OpenScenario, driven: Collection[str]) -> None:
+        self._left_hand = storyboard.left_hand
         root = etree.fromstring(to_xml(storyboard))
         # esmini writes "unsupported controller type" for those that it does not know, and one that
         # an ObjectController merely names is not on: its default controller would drive.
@@ -116,7 +117,7 @@ class ScenarioFile:
         for network in root.iterfind("./RoadNetwork/LogicFile"):
             network.set("filepath", str(roads))
         for name, vertices in course.items():
-            _follow(root, name, vertices)
+            _follow(root, name, vertices, left_hand=self._left_hand)
         return Template(root)
 
 
@@ -242,14 +243,14 @@ def _groups_of(root: Node, name: str) -> Iterator[Node]:
             yield group
 
 
-def _follow(root: Node, name: str, course: Float) -> None:
+def _follow(root: Node, name: str, course: Float, *, left_hand: bool) -> None:
     """Write a course in the place of the timed trajectory that an entity follows."""
     for group in _groups_of(root, name):
         for line in group.iter("Polyline"):
             vertex = deepcopy(line[0])
             for old in [*line]:
                 line.remove(old)
-            for time, x, y, h in course.tolist():
+            for time, x, y, h in opposite(course, (2, 3) if left_hand else ()).tolist():
                 new = deepcopy(vertex)
                 new.set("time", repr(time))
                 place = new.find("./Position/WorldPosition")

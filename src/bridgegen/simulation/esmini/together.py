@@ -94,6 +94,8 @@ class _Row:
         self._numbers = [library.number(name) for name in joint.names]
         self._ego = self._numbers[0]
         self._own_step = joint.time_step / steps
+        # esmini runs the files, which drive on the left where ours is their mirror image.
+        self._side = -1.0 if joint.left_hand else 1.0
         self._before = joint.states(0)
         for name, number, is_there in zip(
             joint.names, self._numbers, joint.present(0), strict=True
@@ -150,7 +152,7 @@ class _Row:
             if state is not None:
                 if not all(map(math.isfinite, state)):
                     raise EsminiError(f"a state of '{name}' became NaN or infinite")
-                x, y, h, v = state
+                x, y, h, v = state[0], self._side * state[1], self._side * state[2], state[3]
                 # Only with several steps, of which one may fire the stop trigger.
                 way = v * late  # it stopped between two instants: they go on as they were going
                 bodies.append(e)
@@ -177,5 +179,6 @@ class _Row:
                 x, y, h, v = states[e].tolist()
                 *_, before_h, before_v = self._before[e].tolist()
                 a, turn = (v - before_v) / self._own_step, (h - before_h) / self._own_step
-                self._library.report(self._numbers[e], x, y, h, v, a, turn)
+                place = x, self._side * y, self._side * h
+                self._library.report(self._numbers[e], *place, v, a, self._side * turn)
         self._before = states

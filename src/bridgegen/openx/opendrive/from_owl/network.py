@@ -5,6 +5,7 @@ Only the individuals count: a file that was edited in Protégé converts like an
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from bridgegen.base.errors import InputError, OntologyError, UnsupportedError
@@ -15,6 +16,7 @@ from bridgegen.openx.opendrive.from_owl.legs import corner, read_arm, read_id, r
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.user_data import UserData, user_datum
 from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.mirror import is_left_hand
 from bridgegen.scenario.ontology.vocabulary import Subject
 
 MOST_LEGS = 5
@@ -45,6 +47,17 @@ def opendrive_from_owl(individuals: Individuals) -> OpenDrive:
         InputError: the road network is a map that exists already.
     """
     network = individuals.one("RoadNetwork")
+    made = _made(individuals, network)
+    if (country := individuals.optional_text(network, "has_country")) is not None:
+        roads = tuple(
+            replace(road, types=tuple(replace(kind, country=country) for kind in road.types))
+            for road in made.roads
+        )
+        made = replace(made, roads=roads)
+    return replace(made, left_hand=is_left_hand(individuals))
+
+
+def _made(individuals: Individuals, network: Subject) -> OpenDrive:
     name = individuals.text(network, "has_name")
     existing = individuals.optional_text(network, "has_map_file")
     if existing is not None:

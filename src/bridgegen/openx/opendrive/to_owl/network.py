@@ -194,6 +194,8 @@ class _Map(Builder):
         self.network = self.node("road_network", "RoadNetwork")
         self.put(self.network, "has_name", model.header.name or stem)
         self.put(self.network, "has_map_file", map_file)
+        if model.left_hand:
+            self.put(self.network, "has_driving_side", "left")
         if digest is not None:
             self.put(self.network, "has_map_digest", digest)
         self.junctions = Junctions(self, self.network, model)

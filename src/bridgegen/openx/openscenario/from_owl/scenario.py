@@ -8,6 +8,7 @@ What other tools need (found by reading and running esmini): orientations always
 ``override`` as of 1.2; routes by lane positions; inline vehicles; a stop trigger.
 """
 
+from dataclasses import replace
 from itertools import count
 
 from bridgegen.base.errors import OntologyError
@@ -21,6 +22,7 @@ from bridgegen.openx.openscenario.from_owl.signals import Signals, environment
 from bridgegen.openx.openscenario.parameters import EGO
 from bridgegen.openx.openscenario.write import least_version, to_version
 from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.mirror import is_left_hand
 from bridgegen.scenario.ontology.vocabulary import Subject
 
 DATE = "2025-01-01T00:00:00"
@@ -44,7 +46,8 @@ def openscenario_from_owl(
         OntologyError: an individual lacks what a scenario needs, or contradicts another.
         UnsupportedError: a participant or an action of a class that cannot be written yet.
     """
-    return _Converter(individuals).scenario(road_file, date)
+    made = _Converter(individuals).scenario(road_file, date)
+    return replace(made, left_hand=is_left_hand(individuals))
 
 
 class _Converter:

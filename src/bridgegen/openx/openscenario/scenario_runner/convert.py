@@ -106,6 +106,7 @@ def for_scenario_runner(
             (osc.Story("story", (act,)),),
             osc.Trigger((story.criteria(roads), end.condition_groups[0])),
         ),
+        left_hand=scenario.left_hand,
     )
 
 

@@ -48,6 +48,8 @@ class Network:
             where the route does not cross it.
         crosswalks: ``(P, C, 5)`` float64 of the ego's first route; see `Rollout.crosswalks`.
         maps: P road maps, if a driver wants them.
+        left_hand: whether they are the mirror image of left-hand traffic.
+        country: by whose law they are judged, a code of ISO 3166-1; "" where it is not one.
     """
 
     def __init__(
@@ -57,6 +59,9 @@ class Network:
         courses: Sequence[Mapping[str, Float]] = (),
     ) -> None:
         self._program = program
+        self.left_hand = any(model.left_hand for model in models)
+        stated = {kind.country for model in models for road in model.roads for kind in road.types}
+        self.country = str(stated.pop() or "") if len(stated) == 1 else ""
         given = courses or [{}] * len(models)
         self._ways = [
             Ways(program.on_course(course), model)

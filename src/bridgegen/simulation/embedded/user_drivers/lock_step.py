@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.drivers._ghost_kernels import WHAT
+from bridgegen.drivers import mirror
 from bridgegen.drivers._tracking_kernels import TRACK
 from bridgegen.drivers._weather_columns import STATED
 from bridgegen.drivers.compiled import CONFLICT
@@ -136,6 +137,8 @@ class Wheel:
         self._scene = _scene(program)
         if "map" in wants:
             maps, map_of = batch.maps()
+            if batch.left_hand:
+                maps = tuple(map(mirror.road_map, maps))
             self._scene = replace(self._scene, maps=maps, map_of=map_of)
             self._nearby, self._places = np.zeros((n, MEMORY)), np.full((n, 1 + NEAR_PIECES), -1)
         self._views: dict[str, npt.NDArray[Any]] = {}
@@ -208,7 +211,10 @@ class Wheel:
         takes_two = self._driver.traits.max_rows != 1
         if len(x) == 1 and takes_two and not self._driver.answers_each_row:
             self._try_two(observation)
-        return self._driver.act(observation, self._views)
+        if not batch.left_hand:
+            return self._driver.act(observation, self._views)
+        seen = mirror.observation(observation)
+        return mirror.answer(self._driver.act(seen, mirror.views(self._views)))
 
     def _look(self, k: int) -> None:
         """Fill the views of instant k."""
@@ -234,7 +240,10 @@ class Wheel:
         both = replace(self._scene, map_of=np.repeat(self._scene.map_of, 2))
         self._driver.reset(2, both)
         twice = {word: np.repeat(view, 2, axis=0) for word, view in self._views.items()}
-        self._driver.act(observation.take(np.zeros(2, dtype=np.int64)), twice)
+        seen = observation.take(np.zeros(2, dtype=np.int64))
+        if self._batch.left_hand:
+            seen, twice = mirror.observation(seen), mirror.views(twice)
+        self._driver.act(seen, twice)
         self._driver.reset(1, self._scene)
 
 
