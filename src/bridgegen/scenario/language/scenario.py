@@ -287,6 +287,7 @@ class LogicalScenario(SearchedScenario):
             for participant in self.participants
             if participant.model
         }
+        changes = {item.name: item.change for item in self.participants if item.change}
         priors = {name: item.prior for name, item in self.parameters.items() if item.prior}
         parts = (
             priors,
@@ -299,6 +300,7 @@ class LogicalScenario(SearchedScenario):
             types,
             models,
             ways,
+            changes,
             self.criteria,
             self.clauses,
             self.matrix,

@@ -104,7 +104,8 @@ class Roads(NamedTuple):
     of gravity [m/s²] what acts against the motion, and to the right, and the share [1] by which it
     presses less on the road; L is 0 on a network whose roads are level. ``bends`` ``(K, L)`` and
     ``drops`` ``(L,)`` are where the next bend of each path is, and the next lower speed limit; see
-    ``ego._speed_kernels``. ``lanes`` is ``lane_tables.lanes_along``, and ``pieces`` and
+    ``ego._speed_kernels``. ``changes`` ``(V, 5)`` is where the ego's route may change lanes, see
+    ``ego._gap_kernels``. ``lanes`` is ``lane_tables.lanes_along``, and ``pieces`` and
     what follows them are `bridgegen.drivers.map_grid.Grid`; without rows unless a driver wants
     them.
     """
@@ -146,6 +147,7 @@ class Roads(NamedTuple):
     meetings: Float
     lines: Float
     signs: Float
+    changes: Float
     lanes: Float
     pieces: Float
     middles: Float
@@ -246,6 +248,8 @@ class State(NamedTuple):
         sensors: ``(E, MEMORY)``, between two frames; see ``ego._perception_kernels``.
         tracks: ``(E, TRACK)`` what the ego perceives; see ``ego._tracking_kernels``.
         around: ``(E, AROUND)`` the same from its route; see ``ego._surroundings_kernels``.
+        beside: the same from the lane that its route changes to, see ``ego._gap_kernels``; no rows
+            without one.
         passages: ``(·, PASSAGE)`` what it predicts; see ``ego._prediction_kernels``.
         feet: ``(W,)`` [m], stations of the tracks on the ways that they may be on.
         mind: ``(·,)`` its further state; see ``ego._reference_kernels``, or the memory of a user's
@@ -343,6 +347,7 @@ class State(NamedTuple):
     sensors: Annotated[Float, "entities", "sensors"]
     tracks: Annotated[Float, "entities", "track"]
     around: Annotated[Float, "entities", "around"]
+    beside: Annotated[Float, "beside", "around"]
     passages: Annotated[Float, "passages", "passage"]
     feet: Annotated[Float, "hypotheses"]
     mind: Annotated[Float, "mind"]

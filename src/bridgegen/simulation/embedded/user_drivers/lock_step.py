@@ -193,7 +193,7 @@ class Wheel:
             v=v,
             a=record.a[:, 0, k - 1] if k else np.zeros(len(x)),
             target_speed=state.command[:, 0],
-            offset=record.offset[:, 0, k],
+            offset=state.aside[:, 0] if state.beside.size else record.offset[:, 0, k],
             route=self._route,
             tracks=self._tracks,
             stop_distance=self._stop,
