@@ -387,6 +387,17 @@ def test_the_ego_cuts_in_before_one_who_comes_from_behind(track, meeting, course
     assert verdict(far) == (BV, Rule.REAR_DISTANCE)
 
 
+@pytest.mark.parametrize("ahead", [24.0, 30.0, 60.0])
+def test_the_ego_changes_lanes_behind_one_that_is_slower_there(track, meeting, course, ahead):
+    """The slower one has never left its lane, though it comes to where the ego will drive."""
+    slide = course((0.0, 0.0), (1.0, 0.0), (1.05, 2.0), (2.8, 2.0), (2.85, 0.0), (9.0, 0.0))
+    ego = track(v=25.0, slide=slide, t=9.0)
+    ego["offset"] = ego["y"].copy()
+    found = meeting(ego, track(x=ahead, y=3.5, v=15.0, t=9.0), claims=[0])
+    assert analyse(found).type[0, 1] == ConflictType.REAR_END_STRIKING
+    assert verdict(found) == (EGO, Rule.REAR_DISTANCE)
+
+
 def test_cut_ins_are_preventable_where_the_regulations_driver_avoids_them(track, meeting):
     """Against `avoids_cut_in`, which has the crashes of the Commission's own code."""
     rng = np.random.default_rng(0)

@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.assess.conflict._geometry_kernels import pose_before, turned
+from bridgegen.assess.conflict._geometry_kernels import beside, pose_before, turned
 from bridgegen.assess.conflict._limits import (
     AHEAD,
     AHEAD_TIME,
@@ -193,6 +193,23 @@ def ego_came_over(scene, e, k, way):
         return False
     mine, its = steering(scene, e, k, LATELY)
     return mine >= its - 1e-9  # m: rounding does not decide between two that go straight
+
+
+@kernel
+def ego_will_come_over(scene, e, k, side):
+    """Return whether body e is in the ego's way since instant k because the ego changes course.
+
+    Where the other is then, on the ego's ``side`` (1 left, -1 right), the ego will have moved across
+    its route, while the other has kept its course `LATELY`.
+    """
+    x, y, c, s, offset = scene.x, scene.y, scene.c, scene.s, scene.offset
+    j, _ = beside(x[0], y[0], c[0], s[0], scene.first, scene.n, k, x[e, k], y[e, k])
+    if c[0, k] * c[0, j] + s[0, k] * s[0, j] < SAME_WAY:
+        return False
+    if side * (offset[0, j] - offset[0, k]) <= ASIDE:
+        return False
+    _, its = steering(scene, e, k, LATELY)
+    return its < ASIDE
 
 
 @kernel
