@@ -5,7 +5,7 @@ several places of it. Until a driver that looks has decided it is on the last of
 its own lane is what lies ahead; it decides at each place in turn, and then is on that way. It
 indicates first. The gap must do for both who will be behind the other: the one that closes in can
 brake comfortably, and a second of the slower one's speed remains between them. While there is none,
-it lets the vehicle ahead on that lane get away, and stops before the last place.
+it follows the vehicle ahead on that lane, too, and brakes to stop before the last place.
 
 Ways are rows of ``changes`` ``(V, 5)``, the first place first: the path that changes there, where
 on it the change begins and how long it is [m], how far left it leads [m], and the path along which
@@ -61,6 +61,9 @@ INDICATES = 3.0  # s, before a change; source: UN R79, 5.6.4.6
 FOLLOWER_BRAKES = 3.0  # m/s², by no more than this, …
 FOLLOWER_DELAY = 0.4  # s, … after this, …
 FOLLOWER_HEADWAY = 1.0  # s, … to keep this; source: UN R79, 5.6.4.7
+# With a second to the last, it and one who let it in braked together down to walking speed, in one
+# of ten random rows of merge-ego.
+LAST_HEADWAY = 0.5  # s, instead, once it brakes for the end of the stretch; ours
 GOES_ON = 3.0  # m/s²; from a gap that it needs more to stop before, it goes on
 AHEAD = 200.0  # m, how far ahead it looks on the other lane
 FALLS_BACK = 2.0  # m/s, slower than the vehicle beside or ahead that it lets get away
@@ -113,17 +116,23 @@ def without_joining(passages, count, changes):
 
 
 @kernel
-def leaves_room(gap, ahead, behind, grip):
-    """Return whether a gap [m] does for the one behind, at their speeds [m/s]; see the module."""
+def leaves_room(gap, ahead, behind, grip, headway):
+    """Return whether a gap [m] does for the one behind, at their speeds [m/s]; see the module.
+
+    A ``headway`` [s] of the slower one's speed is to remain.
+    """
     closing = max(behind - ahead, 0.0)
     braking = closing * closing / (2.0 * min(FOLLOWER_BRAKES, grip))
-    keeps = FOLLOWER_HEADWAY * min(ahead, behind)
+    keeps = headway * min(ahead, behind)
     return gap >= max(STANDSTILL_GAP, closing * FOLLOWER_DELAY + braking + keeps)
 
 
 @kernel
-def look_aside(s, v, front, rear, half_width, grip, around):
-    """Return (whether there is a gap on the other lane, what waiting for it asks for [m/s²])."""
+def look_aside(s, v, front, rear, half_width, grip, headway, decided, around):
+    """Return (whether there is a gap on the other lane, what that lane asks for [m/s²]).
+
+    It follows who is ahead there: in comfort, until it has ``decided`` to change.
+    """
     free, asked = True, math.inf
     for e in range(1, around.shape[0]):
         if around[e, NEAR] == 0.0:
@@ -137,19 +146,21 @@ def look_aside(s, v, front, rear, half_width, grip, around):
         ahead = around[e, AT] - around[e, HALF_LENGTH] - s - front
         behind = s - rear - around[e, AT] - around[e, HALF_LENGTH]
         if behind > 0.0:
-            free = free and leaves_room(behind, v, w, grip)
-        elif ahead <= 0.0 or not leaves_room(ahead, w, v, grip):
-            free = False
-            allowed = (w - FALLS_BACK - v) / SPEED_TIME
-            if ahead > 0.0:
-                allowed = min(allowed, follow(ahead, v, w, around[e, GAINING]))
-            asked = min(asked, max(allowed, -COMFORT_DECELERATION))
+            free = free and leaves_room(behind, v, w, grip, headway)
+            continue
+        allowed = follow(ahead, v, w, around[e, GAINING]) if ahead > 0.0 else math.inf
+        if decided:
+            asked = min(asked, allowed)
+            continue
+        if ahead <= 0.0 or not leaves_room(ahead, w, v, grip, headway):
+            free, allowed = False, min(allowed, (w - FALLS_BACK - v) / SPEED_TIME)
+        asked = min(asked, max(allowed, -COMFORT_DECELERATION))
     return free, asked
 
 
 @kernel
 def await_gap(k, step, perceives, plan, roads, state, record):
-    """Change to a way that changes lanes if there is a gap; return what waiting asks for [m/s²].
+    """Change to a way that changes lanes if there is a gap; return what that asks for [m/s²].
 
     +inf if nothing. To be called every ``step`` [s] from instant 0 on. A driver that does not
     perceive sees everybody. ``state`` is changed in place: the path that the ego is on, its
@@ -160,13 +171,11 @@ def await_gap(k, step, perceives, plan, roads, state, record):
     if k == 0:
         state.on[0] = int(changes[last, PATH])
     p, s, v = state.on[0], state.station[0], record.v[0, k]
+    front = plan.bodies[0, 2] + 0.5 * plan.bodies[0, 0]
     if not is_pending(changes, p, s):
         state.switched[0] &= ~(LEFT | RIGHT)
         return math.inf
-    front = plan.bodies[0, 2] + 0.5 * plan.bodies[0, 0]
-    begins = changes[last, BEGINS]
-    decided = p != int(changes[last, PATH]) or s >= begins
-    if decided or s < changes[0, BEGINS] - INDICATES * v - front:
+    if s < changes[0, BEGINS] - INDICATES * v - front:
         return math.inf
     state.switched[0] |= LEFT if changes[last, LEADS] > 0.0 else RIGHT
     target = int(changes[last, TARGET])
@@ -184,23 +193,27 @@ def await_gap(k, step, perceives, plan, roads, state, record):
                     state.lamps, state.tracks,
                 )  # fmt: skip
     surround(way, n, ds, mind[ABREAST], FAR_BEHIND, AHEAD, step, state.tracks, state.beside)
+    to_stop = max(changes[last, BEGINS] - s - front, 0.1)
+    stops = stop_for(to_stop, v)
+    # A change that has begun is completed, and so is one that it would have to brake hard to leave.
+    decided = p != int(changes[last, PATH]) or s >= changes[last, BEGINS]
+    decided = decided or (mind[WAS_FREE] > 0.0 and v * v > 2.0 * GOES_ON * to_stop)
     free, asked = look_aside(
         mind[ABREAST], v, front, plan.bodies[0, 0] - front, 0.5 * plan.bodies[0, 1],
-        state.weather[FRICTION], state.beside,
+        state.weather[FRICTION], FOLLOWER_HEADWAY if stops == math.inf else LAST_HEADWAY, decided,
+        state.beside,
     )  # fmt: skip
+    if decided:
+        return asked
     free = free and mind[SIGNALS] > INDICATES
-    was_free = mind[WAS_FREE] > 0.0
-    to_stop = max(begins - s - front, 0.1)
-    if was_free and v * v > 2.0 * GOES_ON * to_stop:
-        return math.inf
     mind[WAS_FREE] = 1.0 if free else 0.0
     if not free:
-        return min(asked, stop_for(to_stop, v))
+        return min(asked, stops)
     for j in range(last):
         # It looks when the place is reached, not up to 20 m before.
         if 0.0 <= changes[j, BEGINS] - s <= 1.5 * v * step + 0.1:
             state.on[0] = int(changes[j, PATH])
-    return math.inf
+    return asked
 
 
 @kernel

@@ -20,7 +20,7 @@ from bridgegen.drivers._following_kernels import (
     COMFORT_DECELERATION,
     keep_distance,
 )
-from bridgegen.drivers._gap_kernels import await_gap, is_pending, leads_on, without_joining
+from bridgegen.drivers._gap_kernels import await_gap, leads_on, without_joining
 from bridgegen.drivers._lane_change_kernels import LAST, change_lane, look_back, shift_of
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.drivers._path_kernels import UNSHIFTED, pursue_beside, shift_speed
@@ -91,8 +91,8 @@ def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_l
         halts: stations of the lines of stop signs [m].
         lights: their states.
         elapsed: since the last plan [s].
-        waits: the acceleration that waiting for a gap asks for, where the route is yet to change
-            lanes [m/s²]; NaN where it is not.
+        waits: the acceleration that waiting for a gap asks for [m/s²]; NaN where the route changes
+            no lanes. Where it does, nobody is passed.
         mind: see above.
     """
     front, rear, half_width = body[2] + 0.5 * body[0], 0.5 * body[0] - body[2], 0.5 * body[1]
@@ -163,11 +163,7 @@ def drive(k, plan_, roads, state, record):
         mind[NEXT_PLAN] += max(CYCLE, plan_.dt)
         waits, turns = math.nan, roads.changes.shape[0] > 0
         if turns:
-            waits = await_gap(
-                k, max(CYCLE, plan_.dt), True, plan_, roads, state, record
-            )  # fmt: skip
-            if not is_pending(roads.changes, state.on[0], s):
-                waits = math.nan
+            waits = await_gap(k, max(CYCLE, plan_.dt), True, plan_, roads, state, record)
         p = state.on[0]
         # The map's data are known along the first route only; on another one it drives on sight.
         known = leads_on(roads.changes, p)
