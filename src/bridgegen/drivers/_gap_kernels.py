@@ -64,6 +64,7 @@ FOLLOWER_HEADWAY = 1.0  # s, … to keep this; source: UN R79, 5.6.4.7
 # With a second to the last, it and one who let it in braked together down to walking speed, in one
 # of ten random rows of merge-ego.
 LAST_HEADWAY = 0.5  # s, instead, once it brakes for the end of the stretch; ours
+KEEPS_TO = 1.0  # m, from the middle of a lane, within which a body keeps to it
 GOES_ON = 3.0  # m/s²; from a gap that it needs more to stop before, it goes on
 AHEAD = 200.0  # m, how far ahead it looks on the other lane
 FALLS_BACK = 2.0  # m/s, slower than the vehicle beside or ahead that it lets get away
@@ -214,6 +215,24 @@ def await_gap(k, step, perceives, plan, roads, state, record):
         if 0.0 <= changes[j, BEGINS] - s <= 1.5 * v * step + 0.1:
             state.on[0] = int(changes[j, PATH])
     return asked
+
+
+@kernel
+def is_other_lanes(e, front, roads, state):
+    """Return whether body e keeps to the other lane, so that looking for a gap is all it takes.
+
+    Once the ego, whose bumper is ``front`` [m] ahead, has decided, that is so of those behind it
+    alone, who can brake for it.
+    """
+    changes, mind, beside = roads.changes, state.mind, state.beside
+    last = changes.shape[0] - 1
+    p, s = state.on[0], state.station[0]
+    if mind[SIGNALS] == 0.0 or beside[e, NEAR] == 0.0 or not is_pending(changes, p, s):
+        return False
+    if abs(beside[e, ASIDE]) > KEEPS_TO or abs(beside[e, ACROSS]) > DRIFT:
+        return False
+    decided = p != int(changes[last, PATH]) or s >= changes[last, BEGINS]
+    return not decided or beside[e, AT] < mind[ABREAST] + front
 
 
 @kernel

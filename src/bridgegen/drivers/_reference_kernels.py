@@ -20,7 +20,12 @@ from bridgegen.drivers._following_kernels import (
     COMFORT_DECELERATION,
     keep_distance,
 )
-from bridgegen.drivers._gap_kernels import await_gap, leads_on, without_joining
+from bridgegen.drivers._gap_kernels import (
+    await_gap,
+    is_other_lanes,
+    leads_on,
+    without_joining,
+)
 from bridgegen.drivers._lane_change_kernels import LAST, change_lane, look_back, shift_of
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.drivers._path_kernels import UNSHIFTED, pursue_beside, shift_speed
@@ -36,7 +41,7 @@ from bridgegen.drivers._speed_kernels import (
     scan_length,
     sight_speed,
 )
-from bridgegen.drivers._surroundings_kernels import BEHIND, surround
+from bridgegen.drivers._surroundings_kernels import BEHIND, NEAR, surround
 from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.drivers._yielding_kernels import yield_to_all
 
@@ -172,6 +177,10 @@ def drive(k, plan_, roads, state, record):
         body, ahead = plan_.bodies[0], reach_of(v)
         elapsed, behind = max(CYCLE, plan_.dt), look_back(mind, BEHIND)
         surround(path, n, ds, s, behind, ahead, elapsed, state.tracks, state.around)
+        if turns:
+            for e in range(1, state.around.shape[0]):
+                if is_other_lanes(e, body[2] + 0.5 * body[0], roads, state):
+                    state.around[e, NEAR] = 0.0
         if plan_.ideal_prediction and known:
             count = predict_truly(
                 path, n, ds, s, ahead, body[1], state.tracks, state.around, roads.paths,

@@ -187,6 +187,7 @@ class State(NamedTuple):
         present: ``(E,)`` bool, whether each is present,
         hidden: ``(E, 2)`` bool, from whom; see ``_codes``,
         visible: ``(E,)`` bool, whether the ego's sensors may see it,
+        heeded: ``(E,)`` bool, and a careful driver of the ego reacts to it,
         minded: ``(E,)`` bool, and attentive drivers may,
         switched: ``(E,)`` int64, its lamps as the storyboard has them; see
             `bridgegen.drivers.kinds`,
@@ -289,6 +290,7 @@ class State(NamedTuple):
     present: Annotated[Bool, "entities"]
     hidden: Annotated[Bool, "entities", 2]
     visible: Annotated[Bool, "entities"]
+    heeded: Annotated[Bool, "entities"]
     minded: Annotated[Bool, "entities"]
     switched: Annotated[Int, "entities"]
     lamps: Annotated[Int, "entities"]
