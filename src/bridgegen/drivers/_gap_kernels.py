@@ -64,7 +64,7 @@ FOLLOWER_HEADWAY = 1.0  # s, … to keep this; source: UN R79, 5.6.4.7
 # With a second to the last, it and one who let it in braked together down to walking speed, in one
 # of ten random rows of merge-ego.
 LAST_HEADWAY = 0.5  # s, instead, once it brakes for the end of the stretch; ours
-KEEPS_TO = 1.0  # m, from the middle of a lane, within which a body keeps to it
+KEEPS_TO = 1.0  # m, towards the ego from the middle of the other lane, up to which a body keeps to it
 GOES_ON = 3.0  # m/s²; from a gap that it needs more to stop before, it goes on
 AHEAD = 200.0  # m, how far ahead it looks on the other lane
 FALLS_BACK = 2.0  # m/s, slower than the vehicle beside or ahead that it lets get away
@@ -176,15 +176,11 @@ def await_gap(k, step, perceives, plan, roads, state, record):
     if not is_pending(changes, p, s):
         state.switched[0] &= ~(LEFT | RIGHT)
         return math.inf
-    if s < changes[0, BEGINS] - INDICATES * v - front:
-        return math.inf
-    state.switched[0] |= LEFT if changes[last, LEADS] > 0.0 else RIGHT
     target = int(changes[last, TARGET])
     way, n, ds = roads.paths[target], roads.counts[target], roads.steps[target]
-    if mind[SIGNALS] == 0.0:
-        mind[ABREAST] = nearest_station(way, n, ds, record.x[0, k], record.y[0, k])
-    mind[SIGNALS] += step
-    mind[ABREAST], _ = project(way, n, ds, mind[ABREAST], record.x[0, k], record.y[0, k])
+    x, y = record.x[0, k], record.y[0, k]
+    guess = nearest_station(way, n, ds, x, y) if k == 0 else mind[ABREAST]
+    mind[ABREAST], _ = project(way, n, ds, guess, x, y)
     if not perceives:
         for e in range(1, record.x.shape[0]):
             state.tracks[e, tracking.STATE] = 0.0
@@ -194,6 +190,10 @@ def await_gap(k, step, perceives, plan, roads, state, record):
                     state.lamps, state.tracks,
                 )  # fmt: skip
     surround(way, n, ds, mind[ABREAST], FAR_BEHIND, AHEAD, step, state.tracks, state.beside)
+    if s < changes[0, BEGINS] - INDICATES * v - front:
+        return math.inf
+    state.switched[0] |= LEFT if changes[last, LEADS] > 0.0 else RIGHT
+    mind[SIGNALS] += step
     to_stop = max(changes[last, BEGINS] - s - front, 0.1)
     stops = stop_for(to_stop, v)
     # A change that has begun is completed, and so is one that it would have to brake hard to leave.
@@ -219,20 +219,21 @@ def await_gap(k, step, perceives, plan, roads, state, record):
 
 @kernel
 def is_other_lanes(e, front, roads, state):
-    """Return whether body e keeps to the other lane, so that looking for a gap is all it takes.
+    """Return whether body e keeps to the other lane, or beyond: then the gap is all that matters.
 
     Once the ego, whose bumper is ``front`` [m] ahead, has decided, that is so of those behind it
     alone, who can brake for it.
     """
-    changes, mind, beside = roads.changes, state.mind, state.beside
+    changes, beside = roads.changes, state.beside
     last = changes.shape[0] - 1
     p, s = state.on[0], state.station[0]
-    if mind[SIGNALS] == 0.0 or beside[e, NEAR] == 0.0 or not is_pending(changes, p, s):
+    if beside[e, NEAR] == 0.0 or not is_pending(changes, p, s):
         return False
-    if abs(beside[e, ASIDE]) > KEEPS_TO or abs(beside[e, ACROSS]) > DRIFT:
+    side = 1.0 if changes[last, LEADS] > 0.0 else -1.0
+    if side * beside[e, ASIDE] < -KEEPS_TO or side * beside[e, ACROSS] < -DRIFT:
         return False
     decided = p != int(changes[last, PATH]) or s >= changes[last, BEGINS]
-    return not decided or beside[e, AT] < mind[ABREAST] + front
+    return not decided or beside[e, AT] < state.mind[ABREAST] + front
 
 
 @kernel

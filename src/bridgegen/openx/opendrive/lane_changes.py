@@ -164,7 +164,9 @@ def turnings(model: OpenDrive, places: Sequence[Place], usual: float) -> list[Tu
 
 
 def coming(model: OpenDrive, place: Place, end: Place, back: float) -> Route:
-    """Return the way along which traffic comes to a place, from ``back`` [m] before, and goes on.
+    """Return the way along which traffic comes to the lane section of a place, and goes on.
+
+    It begins ``back`` [m] before the section, if lanes lead there for so long.
 
     Raises:
         InputError: no lane leads from the place to the end.
@@ -180,7 +182,7 @@ def coming(model: OpenDrive, place: Place, end: Place, back: float) -> Route:
         for lane in section.lanes
         if lane.drivable
     ]
-    length = abs(place.s - entry)
+    length = 0.0
     while length < back:
         at = next((item for item in every if at in next_stretches(model, item)), None)
         if at is None or (at.road_id, at.lane_id) in {(step.road_id, step.lane_id) for step in steps}:
