@@ -64,7 +64,9 @@ FOLLOWER_HEADWAY = 1.0  # s, … to keep this; source: UN R79, 5.6.4.7
 # With a second to the last, it and one who let it in braked together down to walking speed, in one
 # of ten random rows of merge-ego.
 LAST_HEADWAY = 0.5  # s, instead, once it brakes for the end of the stretch; ours
-KEEPS_TO = 1.0  # m, towards the ego from the middle of the other lane, up to which a body keeps to it
+KEEPS_TO = (
+    1.0  # m, towards the ego from the middle of the other lane, up to which a body keeps to it
+)
 GOES_ON = 3.0  # m/s²; from a gap that it needs more to stop before, it goes on
 AHEAD = 200.0  # m, how far ahead it looks on the other lane
 FALLS_BACK = 2.0  # m/s, slower than the vehicle beside or ahead that it lets get away

@@ -199,8 +199,8 @@ def ego_came_over(scene, e, k, way):
 def ego_will_come_over(scene, e, k, side):
     """Return whether body e is in the ego's way since instant k because the ego changes course.
 
-    Where the other is then, on the ego's ``side`` (1 left, -1 right), the ego will have moved across
-    its route, while the other has kept its course `LATELY`.
+    Where the other is then, on the ego's ``side`` (1 left, -1 right), the ego will have moved
+    across its route, while the other has kept its course `LATELY`.
     """
     x, y, c, s, offset = scene.x, scene.y, scene.c, scene.s, scene.offset
     j, _ = beside(x[0], y[0], c[0], s[0], scene.first, scene.n, k, x[e, k], y[e, k])

@@ -478,8 +478,8 @@ def of_striking(scene, e, k, risk, early, since, side, late, stands, avoidable, 
         return NEITHER, REVEALED_LATE
     v = scene.v
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
-    # One that keeps its lane comes into the way of an ego that will change to it, before it does: to
-    # look back alone excused an ego that changed lanes behind a slower car.
+    # One that keeps its lane comes into the way of an ego that will change to it before that does:
+    # to look back alone excused an ego that changed lanes behind a slower car.
     moved = ego_came_over(scene, e, min(risk + 1, k), 0) or ego_will_come_over(scene, e, risk, side)
     claim = scene.claims[e]
     if mine and not its and claim < 0:  # the ego turned into the way of one that had priority

@@ -185,7 +185,9 @@ def coming(model: OpenDrive, place: Place, end: Place, back: float) -> Route:
     length = 0.0
     while length < back:
         at = next((item for item in every if at in next_stretches(model, item)), None)
-        if at is None or (at.road_id, at.lane_id) in {(step.road_id, step.lane_id) for step in steps}:
+        if at is None or (at.road_id, at.lane_id) in {
+            (step.road_id, step.lane_id) for step in steps
+        }:
             break
         ends = _ends(model.road(at.road_id), at)
         length += abs(ends[1] - ends[0])

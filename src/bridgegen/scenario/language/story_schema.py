@@ -70,7 +70,7 @@ class BodySection(ShapedSection):
 
 
 class RouteChangeSection(ShapedSection):
-    """A lane change of the ego's route: where it may take place; when it does, its driver decides."""
+    """A lane change of the ego's route: where it may be; its driver decides when it is."""
 
     lanes: Literal[1, -1]
     """Lane that it changes to: 1 the one to its left, -1 the one to its right."""

@@ -267,7 +267,15 @@ class Storyboard:
                 f"lanes 1, at 0 m, got {given.lanes} and {given.at:g} m",
                 path,
             )
-        elif not merges:
+        elif merges:
+            length = self._roads.knobs["merge_length"]
+            if not isinstance(length, str) and given.within > length:
+                self._report(
+                    f"the ego must have merged within the acceleration lane, {length:g} m, got "
+                    f"{given.within:g} m",
+                    (*path, "within"),
+                )
+        else:
             section_ = WaypointSection(leg=end.leg, way=end.way, distance=given.at)
             if int(first.lane) < 1:
                 self._report(f"a lane change to the right of lane {end.lane} leads off", path)
@@ -375,7 +383,8 @@ class Storyboard:
             lane = start.lane if change is None else int(start.lane) - change.lanes
             if (start.leg, start.way, lane) != (end.leg, end.way, end.lane):
                 self._report(
-                    f"a route changes no lane but by lane_change: {name} goes from {start} to {end}",
+                    f"a route changes no lane but by lane_change: {name} goes from {start} to "
+                    f"{end}",
                     path,
                 )
             return
