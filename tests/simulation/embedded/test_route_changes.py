@@ -93,13 +93,14 @@ def test_one_that_looks_waits_for_a_gap_and_indicates(run, ego):
     assert not rollout.lamps[1, 0, -1] & LEFT
 
 
-def test_one_that_stands_beside_the_stretch_is_passed_first(run):
-    """To change behind it would take more than 3 m/s² from 18 m/s, so it is left behind."""
-    where, offset = begins(run("careful", {"other_at": 200.0, "other_speed": 0.0}))
-    assert where > 200.0
-    assert offset[-1] == pytest.approx(LANE, abs=0.1)
-    behind, _ = begins(run("careful", {"other_at": 350.0, "other_speed": 0.0}))
-    assert behind < 190.0
+def test_it_joins_a_queue_on_the_other_lane_in_comfort(run):
+    """It brakes for the one that stands there before it changes lanes."""
+    rollout = run("careful", {"other_at": 200.0, "other_speed": 0.0})
+    where, _ = begins(rollout)
+    assert where < 200.0
+    assert rollout.v[0, 0, -1] < 0.1
+    assert 1.0 < rollout.x[0, 1, -1] - rollout.x[0, 0, -1] - 4.6 < 4.0
+    assert rollout.a[0, 0].min() > -3.0
 
 
 def test_a_row_has_the_same_bits_in_any_batch(run):

@@ -19,6 +19,8 @@ from bridgegen.assess.conflict._careful_driver_kernels import (
 from bridgegen.assess.conflict._circumstances_kernels import (
     ahead_until,
     ego_came_over,
+    ego_comes_before,
+    ego_goes_over,
     ego_moved,
     ego_will_come_over,
     has_reason,
@@ -448,7 +450,7 @@ def of_struck(scene, e, k, whole):
     """Decide where the other drives into the rear of the ego."""
     since, side, early = entered(scene, e, 0, k, MARGIN)
     mine, _ = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
-    moved = ego_came_over(scene, e, since, 0)
+    moved = ego_came_over(scene, e, since, 0) or ego_comes_before(scene, e, since)
     if side != 0 and (mine or moved):
         whole[DECIDED] = since
         # UN R157, 5.2.5.2, and UN R79, 5.6.4.7: a lane change must not ask more of the one behind.
@@ -571,7 +573,11 @@ def runs_into(scene, e, own, since):
 @kernel
 def of_leaving(scene, e, k, kind, own, since, avoidable):
     """Decide where two meet side by side, or head on: which one has left its lane?"""
-    if ego_came_over(scene, e, k, side_of(scene, e, k)):
+    towards = side_of(scene, e, k)
+    if ego_came_over(scene, e, k, towards):
+        return EGO, LEFT_ITS_LANE
+    # Halfway through a lane change one goes straight on, and steers less than one who begins to.
+    if kind == SIDE_SWIPE and ego_goes_over(scene, e, k, towards):
         return EGO, LEFT_ITS_LANE
     claim, late = scene.claims[e], kind == SIDE_SWIPE and avoidable
     late = late and runs_into(scene, e, own, since)
