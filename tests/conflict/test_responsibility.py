@@ -431,6 +431,35 @@ def test_the_ego_cuts_in_before_one_who_comes_from_behind(track, meeting, course
     assert verdict(far) == (BV, Rule.REAR_DISTANCE)
 
 
+@pytest.mark.parametrize("ahead", [24.0, 30.0, 60.0])
+def test_the_ego_changes_lanes_behind_one_that_is_slower_there(track, meeting, course, ahead):
+    """The slower one has never left its lane, though it comes to where the ego will drive."""
+    slide = course((0.0, 0.0), (1.0, 0.0), (1.05, 2.0), (2.8, 2.0), (2.85, 0.0), (9.0, 0.0))
+    ego = track(v=25.0, slide=slide, t=9.0)
+    ego["offset"] = ego["y"].copy()
+    found = meeting(ego, track(x=ahead, y=3.5, v=15.0, t=9.0), claims=[0])
+    assert analyse(found).type[0, 1] == ConflictType.REAR_END_STRIKING
+    assert verdict(found) == (EGO, Rule.REAR_DISTANCE)
+
+
+def test_halfway_through_a_lane_change_the_ego_is_still_the_one_that_comes_over(
+    track, meeting, course
+):
+    """The other begins to steer away; the ego, which moves over evenly, steers less lately."""
+    h = course((0.0, 0.0), (1.0, 0.0), (1.2, 0.024), (5.0, 0.024), (5.2, 0.0), (6.0, 0.0))
+    ego = track(v=25.0, h=h)
+    ego["offset"] = ego["y"].copy()
+    away = course((0.0, 0.0), (2.6, 0.0), (3.2, 0.15), (6.0, 0.15))
+    found = meeting(ego, track(x=1.0, y=3.0, v=25.0, slide=away), claims=[0])
+    assert analyse(found).type[0, 1] == ConflictType.SIDE_SWIPE
+    assert verdict(found) == (EGO, Rule.LEFT_ITS_LANE)
+    # one that comes over faster than the ego does, from the same place, is to blame
+    towards = course((0.0, 0.0), (1.5, 0.0), (1.55, -1.2), (6.0, -1.2))
+    found = meeting(ego, track(x=1.0, y=5.0, v=25.0, slide=towards), claims=[0])
+    assert analyse(found).type[0, 1] == ConflictType.SIDE_SWIPE
+    assert verdict(found) == (BV, Rule.LEFT_ITS_LANE)
+
+
 def test_cut_ins_are_preventable_where_the_regulations_driver_avoids_them(track, meeting):
     """Against `avoids_cut_in`, which has the crashes of the Commission's own code."""
     rng = np.random.default_rng(0)

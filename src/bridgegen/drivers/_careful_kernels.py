@@ -131,7 +131,7 @@ def drive(k, plan, roads, state, record):
     # counterfactual neither runs a red light nor is saved by that.
     demanded = drive_careful(
         k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
-        planned, state.visible, record.x, record.y, record.h, record.v, plan.bodies,
+        planned, state.heeded, record.x, record.y, record.h, record.v, plan.bodies,
         state.attention,
     )  # fmt: skip
     return min(demanded, asked), keep_to_route(k, roads, state, record)

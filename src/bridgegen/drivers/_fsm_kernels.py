@@ -230,7 +230,7 @@ def drive(k, plan, roads, state, record):
     planned, asked = cruise(k, plan, roads, state, record)
     demanded = drive_fsm(
         k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
-        planned, state.visible, record.x, record.y, record.h, record.v, plan.bodies, plan.kinds,
+        planned, state.heeded, record.x, record.y, record.h, record.v, plan.bodies, plan.kinds,
         state.attention,
     )  # fmt: skip
     return min(demanded, asked), keep_to_route(k, roads, state, record)

@@ -100,6 +100,21 @@ def place(k, present, x, y, h, bodies, memory):
 
 
 @kernel
+def know_body(e, k, dt, x, y, h, v, bodies, kinds, lamps, tracks):
+    """Copy the truth of body e to its track."""
+    cosine, sine = elementary.cos(h[e, k]), elementary.sin(h[e, k])
+    tracks[e, tracking.STATE] = tracking.CONFIRMED
+    tracks[e, tracking.X] = x[e, k] + bodies[e, 2] * cosine
+    tracks[e, tracking.Y] = y[e, k] + bodies[e, 2] * sine
+    tracks[e, tracking.H] = h[e, k]
+    tracks[e, tracking.VX], tracks[e, tracking.VY] = v[e, k] * cosine, v[e, k] * sine
+    tracks[e, tracking.LENGTH], tracks[e, tracking.WIDTH] = bodies[e, 0], bodies[e, 1]
+    tracks[e, tracking.KIND], tracks[e, tracking.CONFIDENCE] = kinds[e], 1.0
+    tracks[e, tracking.UNSEEN], tracks[e, tracking.AGE] = 0.0, k * dt
+    tracks[e, tracking.LAMPS] = lamps[e]
+
+
+@kernel
 def know(k, dt, present, x, y, h, v, bodies, kinds, lamps, tracks, detections):
     """Ideal perception: copy the truth to the tracks, and to the detections of a frame."""
     frame = frame_at(k, dt) >= 0
@@ -107,16 +122,7 @@ def know(k, dt, present, x, y, h, v, bodies, kinds, lamps, tracks, detections):
         if not present[e]:
             blank(detections, e, k, MISSED if frame else NO_FRAME)
             continue
-        cosine, sine = elementary.cos(h[e, k]), elementary.sin(h[e, k])
-        tracks[e, tracking.STATE] = tracking.CONFIRMED
-        tracks[e, tracking.X] = x[e, k] + bodies[e, 2] * cosine
-        tracks[e, tracking.Y] = y[e, k] + bodies[e, 2] * sine
-        tracks[e, tracking.H] = h[e, k]
-        tracks[e, tracking.VX], tracks[e, tracking.VY] = v[e, k] * cosine, v[e, k] * sine
-        tracks[e, tracking.LENGTH], tracks[e, tracking.WIDTH] = bodies[e, 0], bodies[e, 1]
-        tracks[e, tracking.KIND], tracks[e, tracking.CONFIDENCE] = kinds[e], 1.0
-        tracks[e, tracking.UNSEEN], tracks[e, tracking.AGE] = 0.0, k * dt
-        tracks[e, tracking.LAMPS] = lamps[e]
+        know_body(e, k, dt, x, y, h, v, bodies, kinds, lamps, tracks)
         blank(detections, e, k, NO_FRAME)
         if frame:
             detections[e, k, SEEN_BY] = BOTH

@@ -20,6 +20,12 @@ from bridgegen.drivers._following_kernels import (
     COMFORT_DECELERATION,
     keep_distance,
 )
+from bridgegen.drivers._gap_kernels import (
+    await_gap,
+    is_other_lanes,
+    leads_on,
+    without_joining,
+)
 from bridgegen.drivers._ghost_kernels import haunt
 from bridgegen.drivers._lane_change_kernels import LAST, change_lane, look_back, shift_of
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
@@ -37,7 +43,7 @@ from bridgegen.drivers._speed_kernels import (
     scan_length,
     sight_speed,
 )
-from bridgegen.drivers._surroundings_kernels import BEHIND, surround
+from bridgegen.drivers._surroundings_kernels import BEHIND, NEAR, surround
 from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.drivers._yielding_kernels import yield_to_all
 
@@ -47,7 +53,7 @@ PLANNED, NEXT_PLAN, STOPS_FOR = control.SIZE, control.SIZE + 1, control.SIZE + 2
 HALTED = LAST
 """Station of the stop sign at which it halted last [m]."""
 
-MIND = LAST + 1
+MIND = LAST + 4
 
 # As often as the sensors take a frame; control acts at every instant.
 CYCLE = 0.1  # s, between two plans
@@ -64,7 +70,7 @@ def reach_of(v):
 @kernel
 def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_limit, seen,
          light_seen, in_town, around, tracks, passages, n_passages, crosswalks, stop_stations,
-         halts, lights, elapsed, keeps_lane, mind):  # fmt: skip
+         halts, lights, elapsed, keeps_lane, waits, mind):  # fmt: skip
     """Return the acceleration [m/s²] that the planner wants.
 
     Args:
@@ -93,6 +99,8 @@ def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_l
         lights: their states.
         elapsed: since the last plan [s].
         keeps_lane: whether it changes lanes no more.
+        waits: the acceleration that waiting for a gap asks for [m/s²]; NaN where the route changes
+            no lanes. Where it does, nobody is passed.
         mind: see above.
     """
     front, rear, half_width = body[2] + 0.5 * body[0], 0.5 * body[0] - body[2], 0.5 * body[1]
@@ -104,8 +112,10 @@ def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_l
         crosswalks, stop_stations, halts = crosswalks[:0], stop_stations[:0], halts[:0]
     else:
         speed = min(speed, limit_speed(road, drops, road_n, ds, s, v))
-    asked = math.inf
-    if road_n > 0 and not keeps_lane:
+    asked = waits
+    if math.isnan(waits):
+        asked = math.inf
+    if road_n > 0 and math.isnan(waits) and not keeps_lane:
         asked = change_lane(
             road, road_n, ds, s, v, speed, front, rear, half_width, around, tracks, passages,
             n_passages, crosswalks, stop_stations, seen, friction_limit, elapsed, mind,
@@ -160,14 +170,21 @@ def drive(k, plan_, roads, state, record):
     # By time, not by instants: so it plans as often at any step up to `CYCLE`.
     if k * plan_.dt > mind[NEXT_PLAN] - 1e-6:
         mind[NEXT_PLAN] += max(CYCLE, plan_.dt)
+        waits, turns = math.nan, roads.changes.shape[0] > 0
+        if turns:
+            waits = await_gap(k, max(CYCLE, plan_.dt), True, plan_, roads, state, record)
         p = state.on[0]
         # The map's data are known along the first route only; on another one it drives on sight.
-        known = p == 0
+        known = leads_on(roads.changes, p)
         path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
-        road_n = n if known else 0
+        road_n = min(n, roads.counts[0]) if known else 0
         body, ahead = plan_.bodies[0], reach_of(v)
         elapsed, behind = max(CYCLE, plan_.dt), look_back(mind, BEHIND)
         surround(path, n, ds, s, behind, ahead, elapsed, state.tracks, state.around)
+        if turns:
+            for e in range(1, state.around.shape[0]):
+                if is_other_lanes(e, body[2] + 0.5 * body[0], roads, state):
+                    state.around[e, NEAR] = 0.0
         if plan_.ideal_prediction and known:
             count = predict_truly(
                 path, n, ds, s, ahead, body[1], state.tracks, state.around, roads.paths,
@@ -181,7 +198,9 @@ def drive(k, plan_, roads, state, record):
                 roads.hypothesis_zones, roads.hypothesis_ranks, roads.hypothesis_first, state.feet,
                 state.passages,
             )  # fmt: skip
-        in_town = road_n > 0 and roads.road[min(int(s / ds), n - 1), LIMIT] <= FAST_ROAD
+        if turns:
+            count = without_joining(state.passages, count, roads.changes)
+        in_town = road_n > 0 and roads.road[min(int(s / ds), road_n - 1), LIMIT] <= FAST_ROAD
         seen = light_seen = math.inf
         if not plan_.ideal_perception:
             cosine, sine = elementary.cos(record.h[0, k]), elementary.sin(record.h[0, k])
@@ -192,13 +211,14 @@ def drive(k, plan_, roads, state, record):
             path, roads.bends[p], roads.road, roads.drops, n, road_n, ds, s, v, body,
             state.command[0], friction_limit, seen, light_seen, in_town, state.around,
             state.tracks, state.passages, count, roads.crosswalks, roads.stops, roads.halts,
-            state.lights, elapsed, stopping_for(k, plan_, state) >= 0.0, mind,
+            state.lights, elapsed, stopping_for(k, plan_, state) >= 0.0, waits, mind,
         )  # fmt: skip
-    if shift_of(mind) != UNSHIFTED and state.on[0] == 0:
+    on = state.on[0]
+    if shift_of(mind) != UNSHIFTED and leads_on(roads.changes, on):
         curvature = pursue_beside(
-            roads.paths[0],
-            roads.counts[0],
-            roads.steps[0],
+            roads.paths[on],
+            roads.counts[on],
+            roads.steps[on],
             s,
             shift_of(mind),
             record.x[0, k],

@@ -161,7 +161,7 @@ def drive(k, plan, roads, state, record):
     planned, asked = cruise(k, plan, roads, state, record)
     demanded = drive_un_r157(
         k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, planned,
-        state.visible, record.x, record.y, record.h, record.v, plan.bodies, plan.kinds,
+        state.heeded, record.x, record.y, record.h, record.v, plan.bodies, plan.kinds,
         state.attention,
     )  # fmt: skip
     return min(demanded, asked), keep_to_route(k, roads, state, record)

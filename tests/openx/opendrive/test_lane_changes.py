@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
-from bridgegen.openx.opendrive.lane_changes import USUAL, plan_with_changes
+from bridgegen.openx.opendrive.lane_changes import USUAL, coming, plan_with_changes, turnings
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive, Width
 from bridgegen.openx.opendrive.plan_view import Arc, Line, Spiral
-from bridgegen.openx.opendrive.routes import Route
+from bridgegen.openx.opendrive.routes import Place, Route
 
 from .test_routes import alone, check_path, lanes, road
 
@@ -92,3 +92,35 @@ def test_nobody_changes_to_the_other_side() -> None:
 def test_a_route_without_a_change_is_what_it_was() -> None:
     route = plan_with_changes(straight(), [("1", -1, 20.0), ("1", -1, 180.0)])
     assert [(step.lane_id, step.across) for step in route.steps] == [(-1, None)]
+
+
+def stretch(begin: float, by: float, lane: int = -2) -> list[Place]:
+    return [Place("1", -1, 0.0), Place("1", -1, begin), Place("1", lane, by), Place("1", lane, 200)]
+
+
+def test_a_stretch_has_a_way_for_each_place_at_which_a_change_may_begin() -> None:
+    """Lanes of 3 and 3.5 m; 160 m of road for a change of 60 m: it begins at 20, 40 … 120 m."""
+    found = turnings(straight(), stretch(20.0, 180.0), USUAL)
+    assert [turning.begins for turning in found] == pytest.approx([20, 40, 60, 80, 100, 120])
+    for turning in found:
+        assert (turning.length, turning.across) == (60.0, -3.25)
+        x, y = sampled(turning.route)
+        begins = turning.begins
+        for s, t in ((begins, -1.5), (begins + 30.0, -3.125), (begins + 60.0, -4.75), (200, -4.75)):
+            assert np.interp(s, x, y) == pytest.approx(t, abs=1e-3)
+    (only,) = turnings(straight(), stretch(20.0, 60.0), USUAL)
+    assert (only.begins, only.length) == (pytest.approx(20.0), 40.0)
+
+
+def test_a_stretch_needs_room_and_a_lane_beside() -> None:
+    with refuses(InputError, "15 m", "10 m"):
+        turnings(straight(), stretch(20.0, 30.0), USUAL)
+    with refuses(InputError, "lane -1"):
+        turnings(straight(), [*stretch(20.0, 180.0)[:2], *stretch(20.0, 180.0, 1)[2:]], USUAL)
+
+
+def test_traffic_comes_along_the_lane_from_before_its_section() -> None:
+    route = coming(straight(), Place("1", -2, 120.0), Place("1", -2, 200.0), 250.0)
+    assert route.length == pytest.approx(200.0)
+    x, y = sampled(route)
+    assert np.interp([0.0, 100.0, 200.0], x, y) == pytest.approx([-4.75] * 3)

@@ -6,7 +6,7 @@
 import math
 
 from bridgegen.assess.conflict._careful_driver_kernels import bend_at
-from bridgegen.assess.conflict._geometry_kernels import pose_before, turned
+from bridgegen.assess.conflict._geometry_kernels import beside, pose_before, turned
 from bridgegen.assess.conflict._limits import (
     AHEAD,
     ALIKE,
@@ -198,6 +198,69 @@ def ego_came_over(scene, e, k, way):
         return False
     mine, its = steering(scene, e, k, LATELY)
     return mine >= its - 1e-9  # m: rounding does not decide between two that go straight
+
+
+@kernel
+def ego_will_come_over(scene, e, k, side):
+    """Return whether body e is in the ego's way since instant k because the ego changes course.
+
+    Where the other is then, on the ego's ``side`` (1 left, -1 right), the ego will have moved
+    across its route, while the other has kept its course `LATELY`.
+    """
+    x, y, c, s, offset = scene.x, scene.y, scene.c, scene.s, scene.offset
+    j, _ = beside(x[0], y[0], c[0], s[0], scene.first, scene.n, k, x[e, k], y[e, k])
+    begin = max(k - int(JUST_NOW / scene.dt), 0)
+    if c[0, begin] * c[0, j] + s[0, begin] * s[0, j] < SAME_WAY or offset[0, j] == offset[0, k]:
+        return False
+    for i in range(begin, k + 1):
+        if side * (offset[0, j] - offset[0, i]) > ASIDE:
+            _, its = steering(scene, e, k, LATELY)
+            return its < ASIDE
+    return False
+
+
+@kernel
+def going_over(scene, k):
+    """Return how far the ego has moved to the left across its route `LATELY` before instant k [m].
+
+    0 where it turns off.
+    """
+    begin = max(k - int(LATELY / scene.dt), scene.first)
+    if scene.c[0, k] * scene.c[0, begin] + scene.s[0, k] * scene.s[0, begin] < SAME_WAY:
+        return 0.0
+    return scene.offset[0, k] - scene.offset[0, begin]
+
+
+@kernel
+def ego_goes_over(scene, e, k, side):
+    """Return whether the ego moves across its route to body e, beside it, more than that to it.
+
+    Body e is at its ``side``: 1 left, -1 right. Both are compared `LATELY`; where the route leads
+    is where the ego has gone, less what it has moved across.
+    """
+    across = going_over(scene, k)
+    x, y, begin = scene.x, scene.y, max(k - int(LATELY / scene.dt), scene.first)
+    dx, dy = x[0, k] - x[0, begin], y[0, k] - y[0, begin]
+    length = math.sqrt(dx * dx + dy * dy)
+    if side * across <= 0.0 or length <= abs(across) or not ego_moved(scene, k, side):
+        return False
+    sine = across / length
+    cosine = math.sqrt(1.0 - sine * sine)
+    ux, uy = (dx * cosine + dy * sine) / length, (dy * cosine - dx * sine) / length
+    its = ux * (y[e, k] - y[e, begin]) - uy * (x[e, k] - x[e, begin])
+    return side * across > -side * its
+
+
+@kernel
+def ego_comes_before(scene, e, k):
+    """Return whether the ego moves across its route into the way of body e, behind it.
+
+    It does so more than that body steers.
+    """
+    if not ego_moved(scene, k, 0):
+        return False
+    _, its = steering(scene, e, k, LATELY)
+    return abs(going_over(scene, k)) > its
 
 
 @kernel

@@ -19,7 +19,10 @@ from bridgegen.assess.conflict._careful_driver_kernels import (
 from bridgegen.assess.conflict._circumstances_kernels import (
     ahead_until,
     ego_came_over,
+    ego_comes_before,
+    ego_goes_over,
     ego_moved,
+    ego_will_come_over,
     has_set_off,
     on_crosswalk_since,
     ran_red,
@@ -469,7 +472,7 @@ def of_struck(scene, e, k, whole):
     """Decide where the other drives into the rear of the ego."""
     since, side, early = entered(scene, e, 0, k, MARGIN)
     mine, _ = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
-    moved = ego_came_over(scene, e, since, 0)
+    moved = ego_came_over(scene, e, since, 0) or ego_comes_before(scene, e, since)
     if side != 0 and (mine or moved):
         whole[DECIDED] = since
         # UN R157, 5.2.5.2, and UN R79, 5.6.4.7: a lane change must not ask more of the one behind.
@@ -549,7 +552,9 @@ def of_striking(scene, e, k, risk, early, since, side, late, stands, avoidable, 
         return NEITHER, REVEALED_LATE
     v = scene.v
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
-    moved = ego_came_over(scene, e, min(risk + 1, k), 0)
+    # One that keeps its lane comes into the way of an ego that will change to it before that does:
+    # to look back alone excused an ego that changed lanes behind a slower car.
+    moved = ego_came_over(scene, e, min(risk + 1, k), 0) or ego_will_come_over(scene, e, risk, side)
     claim = scene.claims[e]
     if mine and not its and claim < 0:  # the ego turned into the way of one that had priority
         return EGO, rule_of(claim)
@@ -640,7 +645,11 @@ def runs_into(scene, e, own, since):
 @kernel
 def of_leaving(scene, e, k, kind, own, since, avoidable):
     """Decide where two meet side by side, or head on: which one has left its lane?"""
-    if ego_came_over(scene, e, k, side_of(scene, e, k)):
+    towards = side_of(scene, e, k)
+    if ego_came_over(scene, e, k, towards):
+        return EGO, LEFT_ITS_LANE
+    # Halfway through a lane change one goes straight on, and steers less than one who begins to.
+    if kind == SIDE_SWIPE and ego_goes_over(scene, e, k, towards):
         return EGO, LEFT_ITS_LANE
     claim, late = scene.claims[e], kind == SIDE_SWIPE and avoidable
     late = late and runs_into(scene, e, own, since)

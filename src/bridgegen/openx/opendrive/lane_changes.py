@@ -7,6 +7,7 @@ other's that has their directions at its ends.
 import heapq
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -35,6 +36,9 @@ USUAL = 60.0
 
 SHORTEST = 15.0
 """Shortest length of a lane change [m]; with less room there is none; ours."""
+
+EVERY = 20.0
+"""Distance between two places at which a change of the ego's route may begin [m]; ours."""
 
 _COST = 200.0  # m of detour that a lane change is worth
 _SLOPE = 0.1  # m, over which the slope of a lane's centre is taken
@@ -93,6 +97,102 @@ def change_lanes(model: OpenDrive, start: Place, end: Place) -> list[Step]:
             # The first problem is the one to tell: the second search was for a lane that the file
             # did not name.
             raise error from None
+
+
+@dataclass(frozen=True, slots=True)
+class Turning:
+    """A route that changes to the lane beside at one of the places where it may.
+
+    Attributes:
+        route: all of it.
+        begins: where on it the change begins [m].
+        length: of the change [m].
+        across: how far left it leads [m], to the right negative.
+    """
+
+    route: Route
+    begins: float
+    length: float
+    across: float
+
+
+def turnings(model: OpenDrive, places: Sequence[Place], usual: float) -> list[Turning]:
+    """Return the routes over four places that change lanes between the second and the third.
+
+    One for every `EVERY` metres at which the change may begin, the first first; the last has just
+    changed at the third place.
+
+    Args:
+        model: the road network.
+        places: start; from where on it may change; by where it must have; end.
+        usual: length of the change where there is room [m].
+
+    Raises:
+        InputError: there is no lane beside the third place that leads there, or too little room.
+    """
+    start, begin, by, end = places
+    road = model.road(by.road_id)
+    to = Stretch(road.id, section_index(road, by.s), by.lane_id)
+    before = leg(model, start, begin)
+    for item in _beside(model, to):
+        entry = begin.s if begin.road_id == road.id else _ends(road, item)[0]
+        try:
+            before += leg(model, begin, Place(road.id, item.lane_id, entry))
+            break
+        except InputError:
+            continue
+    else:
+        raise InputError(f"no lane leads from {begin} to a lane beside {by}")
+    way = road.direction(by.lane_id)
+    room = (by.s - entry) * way
+    if room < SHORTEST:
+        raise InputError(
+            f"a lane change needs {SHORTEST:g} m of road, but there are {room:.3g} m on road "
+            f"{road.id} from s={entry:g} m to s={by.s:g} m"
+        )
+    length = min(usual, room)
+    found = []
+    for ahead in np.linspace(0.0, room - length, 1 + int((room - length) / EVERY)).tolist():
+        first = entry + way * ahead
+        lead = [*before, Step(road.id, item.lane_id, entry, first)]
+        until = Place(road.id, by.lane_id, first + way * length)
+        steps = [*lead, *_change(road, item, to, first, until.s), *leg(model, until, end)]
+        route = route_along(model, [step for step in steps if step.s != step.s_end])
+        aside = _centre(road, to, first, by.s)[0] - _centre(road, item, first, by.s)[0]
+        found.append(Turning(route, route_along(model, lead).length, length, way * aside))
+    return found
+
+
+def coming(model: OpenDrive, place: Place, end: Place, back: float) -> Route:
+    """Return the way along which traffic comes to the lane section of a place, and goes on.
+
+    It begins ``back`` [m] before the section, if lanes lead there for so long.
+
+    Raises:
+        InputError: no lane leads from the place to the end.
+    """
+    road = model.road(place.road_id)
+    at = Stretch(road.id, section_index(road, place.s), place.lane_id)
+    entry = _ends(road, at)[0]
+    steps = leg(model, Place(road.id, at.lane_id, entry), end)
+    every = [
+        Stretch(each.id, number, lane.id)
+        for each in model.roads
+        for number, section in enumerate(each.sections)
+        for lane in section.lanes
+        if lane.drivable
+    ]
+    length = 0.0
+    while length < back:
+        at = next((item for item in every if at in next_stretches(model, item)), None)
+        if at is None or (at.road_id, at.lane_id) in {
+            (step.road_id, step.lane_id) for step in steps
+        }:
+            break
+        ends = _ends(model.road(at.road_id), at)
+        length += abs(ends[1] - ends[0])
+        steps.insert(0, Step(at.road_id, at.lane_id, *ends))
+    return route_along(model, steps)
 
 
 def _steps(model: OpenDrive, chain: list[Stretch], start: Place, end: Place) -> list[Step]:

@@ -108,6 +108,7 @@ def _moved(story: Story, moved: Callable[[Waypoint], Waypoint]) -> Story:
                 start=moved(participant.start),
                 end=None if participant.end is None else moved(participant.end),
                 path=tuple(map(moved, participant.path)),
+                change=tuple(map(moved, participant.change)),
             )
             for participant in story.participants
         ),

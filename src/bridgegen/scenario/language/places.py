@@ -151,7 +151,7 @@ class Places:
                     path,
                 )
 
-    def _range(self, value: Quantity) -> tuple[float, float]:
+    def range_of(self, value: Quantity) -> tuple[float, float]:
         """Return the least and the greatest value that a constant or a parameter has."""
         if not isinstance(value, str):
             return value, value
@@ -179,7 +179,7 @@ class Places:
                 )
                 return
             for point in (waypoint, other):
-                low, high = self._range(point.distance)
+                low, high = self.range_of(point.distance)
                 if low < at - reach - 1e-9 or high > at + reach + 1e-9:
                     got = f"{low:g}" if low == high else f"{low:g} to {high:g}"
                     self._report(

@@ -290,6 +290,7 @@ class LogicalScenario(SearchedScenario):
             for participant in self.participants
             if participant.model
         }
+        changes = {item.name: item.change for item in self.participants if item.change}
         priors = {name: item.prior for name, item in self.parameters.items() if item.prior}
         parts = (
             priors,
@@ -303,6 +304,7 @@ class LogicalScenario(SearchedScenario):
             models,
             ways,
             self.story.ghosts,
+            changes,
             self.criteria,
             self.clauses,
             self.matrix,

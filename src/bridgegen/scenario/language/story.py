@@ -83,6 +83,8 @@ class Participant:
         siren: whether it is an emergency vehicle on a call, to which all give way.
         exceeds_limit: why it may drive faster than road and weather allow; empty: it may not.
         off_crosswalk: why a pedestrian is on the road away from crosswalks; empty: it is not.
+        change: of the ego's route, which changes to the lane beside: from where on it may, on its
+            lane, and by where it must have, on the other; empty: it keeps its lanes.
     """
 
     name: str
@@ -102,6 +104,7 @@ class Participant:
     place_by: str = field(default="", repr=False, kw_only=True)
     ways: tuple[tuple[Waypoint, Waypoint | None], ...] = field(default=(), repr=False, kw_only=True)
     model: str = field(default="", repr=False, kw_only=True)
+    change: tuple[Waypoint, ...] = field(default=(), repr=False, kw_only=True)
 
     @property
     def body(self) -> Body:

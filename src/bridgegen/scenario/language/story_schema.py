@@ -70,6 +70,18 @@ class BodySection(ShapedSection):
     """Largest deceleration [m/s²]."""
 
 
+class RouteChangeSection(ShapedSection):
+    """A lane change of the ego's route: where it may be; its driver decides when it is."""
+
+    lanes: Literal[1, -1]
+    """Lane that it changes to: 1 the one to its left, -1 the one to its right."""
+    at: Annotated[Metres, Field(ge=0.0)] = 0.0
+    """Distance along the leg where its route ends from which on it may change [m], a constant; at a
+    merge 0, where the acceleration lane begins."""
+    within: Annotated[Metres, Field(ge=15.0)]
+    """Length of road from there on which it must have changed [m], a constant."""
+
+
 class PlaceSection(ShapedSection):
     """Where a participant starts and goes, where a category chooses one of several."""
 
@@ -95,6 +107,8 @@ class ParticipantSection(ShapedSection):
     """Position at time 0."""
     end: WaypointSection | None = None
     """End of the route; required for the ego."""
+    lane_change: RouteChangeSection | None = None
+    """Lane change of the ego's route; those of others are events."""
     place_by: Word | None = None
     """Category that chooses one of ``places`` in each evaluation."""
     places: dict[Word, PlaceSection] = {}

@@ -41,6 +41,7 @@ from bridgegen.scenario.language.story_schema import (
     EventSection,
     GhostSection,
     ParticipantSection,
+    RouteChangeSection,
     WaypointSection,
 )
 from bridgegen.scenario.named_models import MODELS, body_of
@@ -142,6 +143,12 @@ class Storyboard:
                     (*path, "off_crosswalk"),
                 )
             self._check_driver(name, given, path)
+            if given.lane_change and (name != EGO or given.places):
+                self._report(
+                    "a lane_change is for the route of the ego, from one start to one end; others "
+                    "change lanes by events",
+                    (*path, "lane_change"),
+                )
             if given.places:
                 yield self._at_places(name, given, path)
             elif given.path:
@@ -207,9 +214,11 @@ class Storyboard:
     ) -> Participant:
         """Return a participant that keeps to lanes."""
         start = self._places.waypoint(place, (*path, "start"))
-        end = None
+        end, change = None, ()
         if given.end is not None:
             end = self._places.waypoint(given.end, (*path, "end"), above=True)
+            if given.lane_change is not None:
+                change = self._route_change(start, end, given.lane_change, (*path, "lane_change"))
             self._check_route(name, start, end, given, path)
         elif name == EGO:
             self._report("the ego's route must have an end", path)
@@ -252,6 +261,7 @@ class Storyboard:
             type_by=given.type_by or "",
             types=self._choices.types(given),
             model=given.model or "",
+            change=change,
         )
 
     def _ghosts(self) -> Iterator[Ghost]:
@@ -272,6 +282,49 @@ class Storyboard:
             if not isinstance(near, str) and not isinstance(far, str) and near >= far:
                 self._report(f"vanishes < appears [m] must hold, got {near:g} and {far:g}", path)
             yield Ghost(name, given.type, numbers)
+
+    def _route_change(
+        self, start: Waypoint, end: Waypoint, given: RouteChangeSection, path: Path
+    ) -> tuple[Waypoint, ...]:
+        """Return where the ego's route may change lanes, and where it must have; () if nowhere."""
+        if not isinstance(end.lane, int):
+            return ()  # the ego is on lanes: reported where the route is checked
+        merges = self._roads.template == "merge" and start.leg == "ramp"
+        first = Waypoint(end.leg, end.way, given.at, end.lane + given.lanes)
+        last = replace(first, distance=given.at + given.within, lane=end.lane)
+        if merges and (given.at, given.lanes) != (0.0, 1):
+            self._report(
+                "the ego that merges changes to its left from where the acceleration lane begins: "
+                f"lanes 1, at 0 m, got {given.lanes} and {given.at:g} m",
+                path,
+            )
+        elif merges:
+            length = self._roads.knobs["merge_length"]
+            if not isinstance(length, str) and given.within > length:
+                self._report(
+                    f"the ego must have merged within the acceleration lane, {length:g} m, got "
+                    f"{given.within:g} m",
+                    (*path, "within"),
+                )
+        else:
+            section_ = WaypointSection(leg=end.leg, way=end.way, distance=given.at)
+            if int(first.lane) < 1:
+                self._report(f"a lane change to the right of lane {end.lane} leads off", path)
+            else:
+                lane = section_.model_copy(update={"lane": first.lane})
+                self._places.waypoint(lane, path)
+        bounds = [(self._places.range_of(end.distance)[0], last.distance, "end")]
+        if start.leg == end.leg:
+            bounds.append((given.at, self._places.range_of(start.distance)[1], "start"))
+        for far, near, which in bounds:
+            if not near < far:
+                self._report(
+                    f"a lane change lies between the route's start and end: {given.at:g} to "
+                    f"{last.distance:g} m, but its {which} may be at "
+                    f"{far if which == 'end' else near:g} m",
+                    path,
+                )
+        return (Waypoint("ramp", "in", 0.0) if merges else first, last)
 
     def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check model and own body, if there are: what the type's has none of, it has not."""
@@ -357,8 +410,14 @@ class Storyboard:
             return  # reported where the place was read
         by_points = given.start is not None and given.start.point is not None
         if self._roads.template == "road":
-            if (start.leg, start.way, start.lane) != (end.leg, end.way, end.lane):
-                self._report(f"a route changes no lane: {name} goes from {start} to {end}", path)
+            change = given.lane_change
+            lane = start.lane if change is None else int(start.lane) - change.lanes
+            if (start.leg, start.way, lane) != (end.leg, end.way, end.lane):
+                self._report(
+                    f"a route changes no lane but by lane_change: {name} goes from {start} to "
+                    f"{end}",
+                    path,
+                )
             return
         if start.way != "in":
             got = _point(start) if by_points else str(start)

@@ -53,6 +53,9 @@ CONDITIONS = {
 }
 """The class of each kind of condition."""
 
+ROUTE_CHANGE = ("has_change_start", "has_change_end")
+"""Links of a route to the places between which it changes lanes, if it does."""
+
 EGO = "ego"
 
 SMOOTH = 4
@@ -115,6 +118,8 @@ def add_participant(
             "has_destination",
             add_position(builder, f"{name}_destination", participant.end, site),
         )
+        for link, place in zip(ROUTE_CHANGE, participant.change, strict=False):
+            put(route, link, add_position(builder, f"{name}{link[3:]}", place, site))
         put(node, "has_route", route)
     return node
 

@@ -107,7 +107,8 @@ class Roads(NamedTuple):
     of gravity [m/s²] what acts against the motion, and to the right, and the share [1] by which it
     presses less on the road; L is 0 on a network whose roads are level. ``bends`` ``(K, L)`` and
     ``drops`` ``(L,)`` are where the next bend of each path is, and the next lower speed limit; see
-    ``ego._speed_kernels``. ``lanes`` is ``lane_tables.lanes_along``, and ``pieces`` and
+    ``ego._speed_kernels``. ``changes`` ``(V, 5)`` is where the ego's route may change lanes, see
+    ``ego._gap_kernels``. ``lanes`` is ``lane_tables.lanes_along``, and ``pieces`` and
     what follows them are `bridgegen.drivers.map_grid.Grid`; without rows unless a driver wants
     them.
     """
@@ -149,6 +150,7 @@ class Roads(NamedTuple):
     meetings: Float
     lines: Float
     signs: Float
+    changes: Float
     lanes: Float
     pieces: Float
     middles: Float
@@ -189,6 +191,7 @@ class State(NamedTuple):
         present: ``(E,)`` bool, whether each is present,
         hidden: ``(E, 2)`` bool, from whom; see ``_codes``,
         visible: ``(E,)`` bool, whether the ego's sensors may see it,
+        heeded: ``(E,)`` bool, and a careful driver of the ego reacts to it,
         minded: ``(E,)`` bool, and attentive drivers may,
         switched: ``(E,)`` int64, its lamps as the storyboard has them; see
             `bridgegen.drivers.kinds`,
@@ -250,6 +253,8 @@ class State(NamedTuple):
         sensors: ``(E + G, MEMORY)``, between two frames; see ``ego._perception_kernels``.
         tracks: ``(E + G, TRACK)`` what it perceives, ghosts last; see ``ego._tracking_kernels``.
         around: ``(E + G, AROUND)`` the same from its route; see ``ego._surroundings_kernels``.
+        beside: the same from the lane that its route changes to, see ``ego._gap_kernels``; no rows
+            without one.
         passages: ``(·, PASSAGE)`` what it predicts; see ``ego._prediction_kernels``.
         feet: ``(W,)`` [m], stations of the tracks on the ways that they may be on.
         mind: ``(·,)`` its further state; see ``ego._reference_kernels``, or the memory of a user's
@@ -290,6 +295,7 @@ class State(NamedTuple):
     present: Annotated[Bool, "entities"]
     hidden: Annotated[Bool, "entities", 2]
     visible: Annotated[Bool, "entities"]
+    heeded: Annotated[Bool, "entities"]
     minded: Annotated[Bool, "entities"]
     switched: Annotated[Int, "entities"]
     lamps: Annotated[Int, "entities"]
@@ -348,6 +354,7 @@ class State(NamedTuple):
     sensors: Annotated[Float, "perceived", "sensors"]
     tracks: Annotated[Float, "perceived", "track"]
     around: Annotated[Float, "perceived", "around"]
+    beside: Annotated[Float, "beside", "around"]
     passages: Annotated[Float, "passages", "passage"]
     feet: Annotated[Float, "hypotheses"]
     mind: Annotated[Float, "mind"]

@@ -103,7 +103,7 @@ class Batch:
         # One block, since ``_do`` copies the state before every call: that took a fifth off the 99
         # ms of a row in esmini.
         self._block, self.state = _packed(state)
-        self.record = _record(program, n)
+        self.record = _record(program, n, program.switches_lamps or bool(roads.turnings))
         self._messages: dict[int, str] = {}
         self._has_addresses = False
 
@@ -364,7 +364,8 @@ class Batch:
         matters = np.abs(self.record.offset[:, 0]).max(axis=1) > STRAYS
         matters |= bool(np.array(NEEDS_ROOM)[self._program.kinds].any())
         # A corridor is looked up along the first path.
-        matters &= self.state.on[:, 0] == 0  # else it has left that path for another
+        # else it has left that path for another
+        matters &= np.isin(self.state.on[:, 0], [0, *self._roads.turnings])
         networks, of = np.unique(self._rows[matters], return_inverse=True)
         corridor_of = np.full(len(self._rows), -1)
         corridor_of[matters] = of
@@ -542,6 +543,7 @@ def _state(
         "track": TRACK,
         "motion": MOTIONS[program.vehicle],
         "around": AROUND,
+        "beside": m + 1 if roads.turnings else 0,
         "passages": 2 * (m + 1) + hypotheses,
         "passage": PASSAGE,
         "hypotheses": hypotheses,
@@ -571,7 +573,7 @@ def _state(
     return memory.states(n, sizes, given)
 
 
-def _record(program: Program, n: int) -> memory.Record:
+def _record(program: Program, n: int, lamps: bool) -> memory.Record:
     shape = (n, len(program.names), program.n_steps)
     perceived = (n, len(program.names) + len(program.ghosts), program.n_steps, DETECTION)
     # Not zeros: kernels write every instant up to the row's last, and repeat that one to the end.
@@ -589,6 +591,6 @@ def _record(program: Program, n: int) -> memory.Record:
         detections=np.zeros(seen),
         lights=np.empty((n, len(program.lights), program.n_steps), dtype=np.int8),
         present=np.zeros(there, dtype=np.bool_),
-        lamps=np.zeros(shape if program.switches_lamps else (n, 0, 0), dtype=np.int8),
+        lamps=np.zeros(shape if lamps else (n, 0, 0), dtype=np.int8),
         began=np.full((n, len(program.event_names)), -1, dtype=np.int64),
     )

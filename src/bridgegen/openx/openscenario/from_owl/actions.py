@@ -9,6 +9,7 @@ from bridgegen.openx.openscenario.from_owl.quantities import Quantities, quoted_
 from bridgegen.openx.openscenario.from_owl.signals import environment, lamp_states
 from bridgegen.openx.openscenario.movement import uniform_knots
 from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.story import ROUTE_CHANGE
 from bridgegen.scenario.ontology.vocabulary import Subject
 
 
@@ -294,13 +295,15 @@ class Actions:
         return self.route(f"{actor}_route", self._individuals.link(node, "has_route"))
 
     def route(self, name: str, node: Subject) -> osc.PrivateAction:
-        """Return a route by its ends: between them one intersection, crossed the shortest way."""
+        """Return a route by its ends, with one intersection between them, crossed the shortest way.
+
+        Where it changes lanes, a waypoint on either lane says where it may begin, and must end.
+        """
+        links = ("has_start", *ROUTE_CHANGE, "has_destination")
         waypoints = tuple(
-            osc.Waypoint(
-                osc.RouteStrategy.SHORTEST,
-                self._places.position(self._individuals.link(node, end), oriented=True),
-            )
-            for end in ("has_start", "has_destination")
+            osc.Waypoint(osc.RouteStrategy.SHORTEST, self._places.position(place, oriented=True))
+            for link in links
+            if (place := self._individuals.optional_link(node, link)) is not None
         )
         made = osc.Route(name, closed=False, waypoints=waypoints)
         return osc.PrivateAction(osc.RoutingAction(osc.AssignRouteAction(made)))

@@ -14,6 +14,7 @@ from bridgegen.base.compiled import (
 from bridgegen.base.physics import CAREFUL_JERK
 from bridgegen.drivers._attentive_kernels import ASKED, LOOK, look, react, see
 from bridgegen.drivers._following_kernels import COMFORT_ACCELERATION
+from bridgegen.drivers._gap_kernels import leads_on, led_aside
 from bridgegen.drivers._path_kernels import project
 from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.drivers.drivers import SCRIPTED
@@ -70,7 +71,7 @@ def ego_is_through(plan, roads, state):
     p = state.on[0]
     if plan.is_driven == 0 or state.station[0] < (roads.counts[p] - 1) * roads.steps[p]:
         return False
-    return (p == 0 and state.route[0] > 0) or roads.follows[p] == ENDS
+    return (leads_on(roads.changes, p) and state.route[0] > 0) or roads.follows[p] == ENDS
 
 
 @inlined_kernel
@@ -108,9 +109,11 @@ def move_ego(k, demanded, curvature, plan, roads, state, record):
             roads.paths[p], roads.counts[p], roads.steps[p], state.station[0] + step, x, y
         )
         state.aside[0] = record.offset[0, k + 1]
+        if roads.changes.shape[0] > 0:
+            record.offset[0, k + 1] += led_aside(roads.changes, p, state.station[0])
         at_end = state.station[0] >= (roads.counts[p] - 1) * roads.steps[p]
         # On its first path with a route the end is its goal, and ends the scenario.
-        if at_end and (p > 0 or state.route[0] == 0):
+        if at_end and (state.route[0] == 0 or not leads_on(roads.changes, p)):
             pass_end(0, 0.0, roads, state)
     return x, y, h
 
@@ -238,6 +241,8 @@ def impose(e, k, x, y, h, v, plan, roads, state, record):
     )
     if e == 0:
         record.offset[e, k] = state.aside[e]
+        if roads.changes.shape[0] > 0:
+            record.offset[e, k] += led_aside(roads.changes, p, state.station[e])
     to = state.to[e]
     if to >= 0:
         state.foot[e], _ = project(

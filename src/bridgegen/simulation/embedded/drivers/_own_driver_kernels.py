@@ -6,6 +6,7 @@
 import math
 
 from bridgegen.base.compiled import bundled, bundled_row, call_at, kernel
+from bridgegen.drivers._gap_kernels import led_aside
 from bridgegen.drivers.interface import ROUTE_STEP
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
@@ -34,6 +35,8 @@ def fill_inputs(k, plan, roads, state, record):
     inputs[3], inputs[4] = record.h[0, k], record.v[0, k]
     inputs[5] = record.a[0, k - 1] if k > 0 else 0.0
     inputs[6], inputs[7] = state.command[0], record.offset[0, k]
+    if roads.changes.shape[0] > 0:
+        inputs[7] -= led_aside(roads.changes, state.on[0], state.station[0])
     inputs[8], inputs[9] = observe(
         k, plan, roads, state, record, ROUTE_STEP, state.ahead, state.others
     )

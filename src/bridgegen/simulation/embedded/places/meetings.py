@@ -62,7 +62,11 @@ def meetings(program: Program, models: Sequence[OpenDrive], ways: Sequence[Ways]
 
 def _find_zones(zones: Float, number: int, program: Program, ways: Ways) -> None:
     """Fill ``(E, ZONE)`` with where a participant's path meets the others'."""
-    from bridgegen.drivers._yielding_kernels import find_zone  # numba is slow to import
+    from bridgegen.drivers._yielding_kernels import (  # numba is slow to import
+        ACROSS,
+        HOW,
+        find_zone,
+    )
 
     own, bodies = ways.paths[number], program.bodies
     for other in range(len(program.names)):
@@ -80,6 +84,8 @@ def _find_zones(zones: Float, number: int, program: Program, ways: Ways) -> None
             bodies[other],
             zones[other],
         )
+        if other == 0 and ways.turnings and zones[other, HOW] != ACROSS:
+            zones[other] = np.inf  # where the ego changes lanes, and that it will, nobody knows
 
 
 def _follows(ways: Ways, number: int, other: int) -> bool:

@@ -46,6 +46,7 @@ class Network:
         stop_lights: ``(L,)`` int64, the light of each.
         stop_lines: ``(P, L, 3)`` float64, where: x, y [m] and heading [rad], NaN in a road network
             where the route does not cross it.
+        turnings: the ways of the ego whose route changes lanes; see `Ways.turnings`.
         crosswalks: ``(P, C, 5)`` float64 of the ego's first route; see `Rollout.crosswalks`.
         maps: P road maps, if a driver wants them.
         left_hand: whether they are the mirror image of left-hand traffic.
@@ -75,6 +76,17 @@ class Network:
         for p, model in enumerate(models):
             for i, point in enumerate(program.points):
                 self._points[p, i] = position(program, model, point)
+        most = max(len(ways.changes) for ways in self._ways)
+        # Padded by the last place, which kernels look up by its row.
+        self._changes = np.array(
+            [
+                np.pad(ways.changes, ((0, most - len(ways.changes)), (0, 0)), mode="edge")
+                if most
+                else ways.changes
+                for ways in self._ways
+            ]
+        )
+        self.turnings = sorted({number for ways in self._ways for number in ways.turnings})
         e = len(program.names)
         self.station: Float = np.array([each.station[:e] for each in self._ways])
         self.sides: Float = np.array([each.sides[:e] for each in self._ways], dtype=np.float64)
@@ -299,6 +311,7 @@ class Network:
             cell_nodes=_stacked([each.nodes for each in cells]),
             **self.scene._asdict(),
             **self._meetings._asdict(),
+            changes=self._changes,
             lanes=self._lanes,
             pieces=self._grid.pieces,
             middles=self._grid.middles,
@@ -316,7 +329,7 @@ class Network:
         for p, found in enumerate(self._zones):
             for k in range(len(found), len(self._ways[p].paths)):
                 zone = np.full(ZONE, np.inf)
-                if k > 0:
+                if k > 0 and k not in self._ways[p].turnings:
                     find_zone(
                         paths[p, 0],
                         counts[p, 0],

@@ -8,16 +8,26 @@ import numpy as np
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
+from bridgegen.drivers.drivers import STORYBOARD
 from bridgegen.drivers.kinds import IS_CYCLE, IS_VEHICLE
 from bridgegen.drivers.right_of_way import is_off_road
-from bridgegen.openx.opendrive.lane_changes import plan_with_changes
+from bridgegen.drivers.scene import speed_limits
+from bridgegen.openx.opendrive.lane_changes import (
+    USUAL,
+    Turning,
+    coming,
+    plan_with_changes,
+    turnings,
+)
 from bridgegen.openx.opendrive.lane_graph import LaneGraph, Node
 from bridgegen.openx.opendrive.lanes import lane_pose, section_index
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import (
+    Place,
     Route,
     Step,
     Stretch,
+    leg,
     next_stretches,
     plan_route,
 )
@@ -39,6 +49,13 @@ from bridgegen.simulation.embedded.program import (
 UNKNOWN, NONE = -1, -2  # in Ways.numbers: not asked for yet; there is no such way
 ENDS, ASKS, LANDS = -1, -2, -3  # in Path.follows, see ``_travel_kernels``
 LANES, GROUND = -1, -2  # asked for instead of a node, see ``_place_kernels``
+
+CHANGE_TIME = 4.6
+"""Duration of a lane change at the speed limit [s]; source: Toledo and Zohar, Transportation
+Research Record 1999 (2007) 71-78, the mean."""
+
+SEES_BACK = 250.0
+"""Length of the lane that a driver who wants to change to it looks back along [m]; ours."""
 
 _MOST_STRETCHES = 1000
 _NO_SPANS = np.empty((0, 11))
@@ -63,6 +80,9 @@ class Ways:
         lanes: the lanes of the road network, None while nobody has asked for them.
         has_ground: whether somebody has asked where all of them are.
         numbers: ``(R + 1, S)`` int64, the path of a route from a node on; route 0 is no route.
+        turnings: where the ego's route changes lanes in a stated stretch, its ways by where it
+            begins to, by the numbers of their paths; the first is its first path.
+        changes: ``(V, 5)`` the same as kernels read it, see ``_gap_kernels``.
 
     Raises:
         InputError: a position that is not on a road, or a way that no lane leads along.
@@ -80,6 +100,9 @@ class Ways:
         self.lanes: Lanes | None = None
         self.has_ground = False
         self.numbers: Int = np.empty((len(program.waypoints) + 1, 0), dtype=np.int64)
+        self.turnings: dict[int, Turning] = {}
+        self._turnings: list[Turning] = []
+        self.changes = np.empty((0, 5))
         for number, spec in enumerate(program.paths):
             try:
                 if isinstance(spec, AlongTrajectory):
@@ -93,6 +116,7 @@ class Ways:
                 if number < len(program.names):
                     who = f"route of '{program.names[number]}'"
                 raise InputError(f"{program.place}: {who}: {error}") from None
+        self._add_turnings()
         self.spots = np.full((len(program.spots), 5), np.nan)
         if len(program.laterals) or len(program.spots) or program.looks_at_lanes:
             self.plan(0, LANES)
@@ -134,7 +158,8 @@ class Ways:
         for spots in program.waypoints:
             lanes.add_route(spots)
         self.numbers = np.full((len(lanes.ways), len(lanes.nodes)), UNKNOWN)
-        for i, route in enumerate(self.routes):
+        turnings = ((i, turning.route) for i, turning in self.turnings.items())
+        for i, route in (*enumerate(self.routes), *turnings):
             if route is not None:
                 chain = [lanes.graph.numbers[_node(self._model, step)] for step in route.steps]
                 follows = int(lanes.graph.straight[chain[-1]])
@@ -165,8 +190,38 @@ class Ways:
             onward = (node for target in targets for node in graph.onward(target))
             reached[check.entity] = list(dict.fromkeys([*there, *onward]))
 
+    def _add_turnings(self) -> None:
+        """Add the ways of an ego whose route changes lanes in a stated stretch, and the lane's."""
+        found, program = self._turnings, self._program
+        if not found:
+            return
+        for number, turning in enumerate(found):
+            at = len(self.paths) if number else 0
+            self.turnings[at] = turning
+            if number:
+                table, step = sampled(turning.route)
+                rises = slopes(self._model, turning.route, step, len(table))
+                self.paths.append(Path(table, step, _NO_SPANS, self.paths[0].follows, rises))
+        spec = program.paths[0]
+        assert isinstance(spec, AlongLanes)
+        by = Place(*_place(program, spec.via[2]))
+        end = Place(*_end(self._model, spec.via[3].road, spec.via[3].lane, entry=False))
+        target = len(self.paths)
+        self._add_line(sampled(coming(self._model, by, end, SEES_BACK)), ENDS)
+        for kept in (self.routes, self.station, self.sides):
+            kept.pop()  # of entities and trajectories alone
+        self.changes = np.array(
+            [
+                (at, turning.begins, turning.length, turning.across, target)
+                for at, turning in self.turnings.items()
+            ]
+        )
+
     def _add_lanes(self, number: int, spec: AlongLanes) -> None:
-        route = self._along(spec)
+        if number == 0:
+            self._turnings = self._find_turnings(spec)
+        turns = number == 0 and len(self._turnings)
+        route = self._turnings[0].route if turns else self._along(spec)
         side = self._model.road(spec.start.road).direction(spec.start.lane)
         table, step = sampled(route)
         # the ego's driver keeps to a path beside the lane's; the others' offsets are added as
@@ -183,6 +238,23 @@ class Ways:
         if varies and number < len(self._program.names) and not route.is_even(spec.start.road):
             self.uneven[number] = spec.start.road
         self.sides.append(side)
+
+    def _find_turnings(self, spec: AlongLanes) -> list[Turning]:
+        """Return where the ego's route may change lanes between two waypoints that are no ends."""
+        if len(spec.via) != 4 or self._program.driver == STORYBOARD:
+            return []
+        _, begin, by, last = (Place(*_place(self._program, point)) for point in spec.via)
+        try:
+            leg(self._model, begin, by)
+        except InputError:
+            start = Place(*_end(self._model, spec.start.road, spec.start.lane, entry=True))
+            end = Place(*_end(self._model, last.road_id, last.lane_id, entry=False))
+            road = self._model.road(by.road_id)
+            number = section_index(road, by.s)
+            limit = float(speed_limits(road, number, by.lane_id, np.array([by.s]))[0])
+            usual = USUAL if math.isinf(limit) else CHANGE_TIME * limit
+            return turnings(self._model, [start, begin, by, end], usual)
+        return []
 
     def _along(self, spec: AlongLanes) -> Route:
         """Plan from where the start's road is entered to where the last waypoint's road is left.

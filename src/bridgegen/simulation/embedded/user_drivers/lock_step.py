@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.drivers._ghost_kernels import WHAT
 from bridgegen.drivers import mirror
+from bridgegen.drivers._ghost_kernels import WHAT
 from bridgegen.drivers._tracking_kernels import TRACK
 from bridgegen.drivers._weather_columns import STATED
 from bridgegen.drivers.compiled import CONFLICT
@@ -201,7 +201,7 @@ class Wheel:
             v=v,
             a=record.a[:, 0, k - 1] if k else np.zeros(len(x)),
             target_speed=state.command[:, 0],
-            offset=record.offset[:, 0, k],
+            offset=state.aside[:, 0] if state.beside.size else record.offset[:, 0, k],
             route=self._route,
             tracks=self._tracks,
             stop_distance=self._stop,
