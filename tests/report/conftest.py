@@ -214,11 +214,7 @@ def values(layered) -> dict[str, float]:
     """The middle of every range that is left, in light rain, haze and at night."""
     space = layered.space()
     shares = np.full(space.n_var, 0.5)
-    for name, share in {
-        "precipitation": 0.95,
-        "fog_density": 0.95,
-        "sun_altitude_angle": 0.1,
-    }.items():
+    for name, share in {"precipitation": 0.95, "fog_density": 0.95, "sun_altitude_angle": 0.1}.items():
         shares[space.index(name)] = share
     return space.values(space.decode([shares])[0])
 
