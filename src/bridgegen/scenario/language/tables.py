@@ -18,7 +18,7 @@ from bridgegen.base.errors import InputError, ScenarioError
 from bridgegen.scenario.language.checks import try_out
 from bridgegen.scenario.language.parameters import Axis, Parameter, at, nearest
 from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
-from bridgegen.scenario.language.protocols import Clause, Grid
+from bridgegen.scenario.language.protocols import Clause, Collisions, Grid
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.schema_types import (
     ID,
@@ -117,7 +117,8 @@ class PackTable:
                 problems += error.problems
         if problems:
             raise ScenarioError(*(f"{entry}: {one}{where}" for one in problems))
-        kind = next((own.collisions for own in scenario.clauses if own.collisions), "critical")
+        stated = (own.collisions for own in scenario.clauses if own.collisions)
+        kind: Collisions = next(stated, "critical")
         made = replace(
             scenario,
             name=f"{self.file.pack}-{entry}",
