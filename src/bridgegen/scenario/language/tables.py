@@ -18,7 +18,7 @@ from bridgegen.base.errors import InputError, ScenarioError
 from bridgegen.scenario.language.checks import try_out
 from bridgegen.scenario.language.parameters import Axis, Parameter, at, nearest
 from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
-from bridgegen.scenario.language.protocols import Clause, Grid
+from bridgegen.scenario.language.protocols import Clause, Collisions, Grid
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.schema_types import (
     ID,
@@ -39,8 +39,6 @@ class RowSection(ShapedSection):
 
     text: Text
     """Requirement in words."""
-    source: Text | None = None
-    """Place that states it; the table's source by default."""
     scenarios: list[Text] = Field(default=[])
     """Scenarios that answer it, by name."""
     given: dict[str, NumberOrName | Some] = Field(default={})
@@ -105,37 +103,32 @@ class PackTable:
         """
         keys = self.entries[entry][1]
         row, where = self.rows[keys[0]], at(self.document.at(("rows", keys[0])))
-        problems = list[str]()
         parameters, grids = dict(scenario.parameters), list(scenario.matrix)
         grids = [grid for grid in grids if grid.label.startswith(self.file.matrix)]
-        for name, change in (*row.given.items(), *row.shift.items()):
-            try:
+        stated = (own.collisions for own in scenario.clauses if own.collisions)
+        kind: Collisions = next(stated, "critical")
+        try:
+            for name, change in (*row.given.items(), *row.shift.items()):
                 if (old := parameters.get(name)) is None:
                     raise ScenarioError(f"no parameter '{name}'{nearest(name, parameters)}")
                 parameters[name], grids = _changed(old, grids, change, moves=name in row.shift)
-            except InputError as error:
-                problems += error.problems
-        if problems:
-            raise ScenarioError(*(f"{entry}: {one}{where}" for one in problems))
-        kind = next((own.collisions for own in scenario.clauses if own.collisions), "critical")
-        made = replace(
-            scenario,
-            name=f"{self.file.pack}-{entry}",
-            source=row.source or self.file.source,
-            parameters=parameters,
-            matrix=tuple(grids),
-            # Others are of the regulation that the scenario was written for.
-            criteria=scenario.criteria if scenario.objective.rule == "criteria" else (),
-            clauses=tuple(Clause(self.id_of(key), self.rows[key].text, kind) for key in keys),
-        )
-        try:
+            made = replace(
+                scenario,
+                name=f"{self.file.pack}-{entry}",
+                source=self.file.source,
+                parameters=parameters,
+                matrix=tuple(grids),
+                # Others are of the regulation that the scenario was written for.
+                criteria=scenario.criteria if scenario.objective.rule == "criteria" else (),
+                clauses=tuple(Clause(self.id_of(key), self.rows[key].text, kind) for key in keys),
+            )
             if row.given:  # defaults follow what is held, as in a search: clouds come with rain
                 space = made.space(Axis)
                 usual = space.values(space.row({}))
                 moved = {name: replace(it, default=usual[name]) for name, it in parameters.items()}
                 made = replace(made, parameters=moved)
             try_out(made)
-        except ScenarioError as error:
+        except InputError as error:
             raise ScenarioError(*(f"{entry}: {one}{where}" for one in error.problems)) from None
         return made
 
