@@ -281,8 +281,8 @@ class Storyboard:
             lane = end.lane + given.lanes
             if lane < 1 or end.way == "in":
                 self._report(
-                    f"a lane change leads from a lane that goes along the leg to the one beside, got "
-                    f"lane {lane} {end.way} of leg {end.leg}",
+                    "a lane change leads from a lane that goes along the leg to the one beside, "
+                    f"got lane {lane} {end.way} of leg {end.leg}",
                     path,
                 )
             else:
