@@ -103,6 +103,9 @@ def _participant(participant: Participant, scenario: LogicalScenario) -> str:
     if participant.conduct == "obstacle" or (participant.speed == 0.0 and participant.end is None):
         return f"{who}, stands at {_place(participant.start)}{turned}{extra}."
     goes = "" if participant.end is None else f" and goes to {_place(participant.end)}"
+    if participant.change:
+        begin, by = map(_place, participant.change)
+        goes += f", changing lanes between {begin} and {by}"
     return f"{who}, starts at {_place(participant.start)} at {speed}{turned}{extra}{goes}."
 
 

@@ -130,7 +130,7 @@ def test_the_gap_is_the_one_of_un_r79(ahead, behind, needed):
         ("within: 320.0", "within: 5.0", ("lane_change.within", "15")),
         ("lanes: 1, at", "lanes: 2, at", ("lane_change.lanes",)),
         ("end: {lane: 1,", "end: {lane: 2,", ("a route changes no lane but by lane_change",)),
-        ("lanes: 1, at", "lanes: -1, at", ("leads off",)),
+        ("lanes: 1, at", "lanes: -1, at", ("lane 0 out of leg main",)),
         ("at: 160.0", "at: other_at", ("lane_change.at",)),
         ("type: car\n    start: {lane: 1,", "type: car\n    lane_change: {lanes: 1, within: 50}\n"
          "    start: {lane: 1,", ("for the route of the ego",)),

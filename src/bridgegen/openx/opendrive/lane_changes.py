@@ -184,12 +184,11 @@ def coming(model: OpenDrive, place: Place, end: Place, back: float) -> Route:
     ]
     length = 0.0
     while length < back:
-        at = next((item for item in every if at in next_stretches(model, item)), None)
-        if at is None or (at.road_id, at.lane_id) in {
-            (step.road_id, step.lane_id) for step in steps
-        }:
+        before = next((item for item in every if at in next_stretches(model, item)), None)
+        known = {(step.road_id, step.lane_id) for step in steps}
+        if before is None or (before.road_id, before.lane_id) in known:
             break
-        ends = _ends(model.road(at.road_id), at)
+        at, ends = before, _ends(model.road(before.road_id), before)
         length += abs(ends[1] - ends[0])
         steps.insert(0, Step(at.road_id, at.lane_id, *ends))
     return route_along(model, steps)

@@ -214,7 +214,8 @@ class Storyboard:
     ) -> Participant:
         """Return a participant that keeps to lanes."""
         start = self._places.waypoint(place, (*path, "start"))
-        end, change = None, ()
+        end: Waypoint | None = None
+        change: tuple[Waypoint, ...] = ()
         if given.end is not None:
             end = self._places.waypoint(given.end, (*path, "end"), above=True)
             if given.lane_change is not None:
@@ -291,7 +292,8 @@ class Storyboard:
             return ()  # the ego is on lanes: reported where the route is checked
         merges = self._roads.template == "merge" and start.leg == "ramp"
         first = Waypoint(end.leg, end.way, given.at, end.lane + given.lanes)
-        last = replace(first, distance=given.at + given.within, lane=end.lane)
+        until = given.at + given.within
+        last = replace(first, distance=until, lane=end.lane)
         if merges and (given.at, given.lanes) != (0.0, 1):
             self._report(
                 "the ego that merges changes to its left from where the acceleration lane begins: "
@@ -307,20 +309,24 @@ class Storyboard:
                     (*path, "within"),
                 )
         else:
-            section_ = WaypointSection(leg=end.leg, way=end.way, distance=given.at)
-            if int(first.lane) < 1:
-                self._report(f"a lane change to the right of lane {end.lane} leads off", path)
+            lane = end.lane + given.lanes
+            if lane < 1 or end.way == "in":
+                self._report(
+                    "a lane change leads from a lane that goes along the leg to the one beside, "
+                    f"got lane {lane} {end.way} of leg {end.leg}",
+                    path,
+                )
             else:
-                lane = section_.model_copy(update={"lane": first.lane})
-                self._places.waypoint(lane, path)
-        bounds = [(self._places.range_of(end.distance)[0], last.distance, "end")]
+                place = WaypointSection(leg=end.leg, way=end.way, distance=given.at)
+                self._places.waypoint(place.model_copy(update={"lane": lane}), path)
+        bounds = [(self._places.range_of(end.distance)[0], until, "end")]
         if start.leg == end.leg:
             bounds.append((given.at, self._places.range_of(start.distance)[1], "start"))
         for far, near, which in bounds:
             if not near < far:
                 self._report(
                     f"a lane change lies between the route's start and end: {given.at:g} to "
-                    f"{last.distance:g} m, but its {which} may be at "
+                    f"{until:g} m, but its {which} may be at "
                     f"{far if which == 'end' else near:g} m",
                     path,
                 )
