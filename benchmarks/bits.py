@@ -2,6 +2,7 @@
 
 python -m benchmarks.bits            # compare with those published; 10 to 15 minutes
 python -m benchmarks.bits --write    # after a change of results that CHANGELOG names
+python -m benchmarks.bits --new      # add those of scenarios that have none, and of verdicts
 python -m benchmarks.bits --verdicts # the same, of digests with verdicts alone: a minute
 python -m benchmarks.bits --pages    # of runs' rows, as their reports simulate them; 10 minutes
 """
@@ -20,6 +21,7 @@ from bridgegen.scenario.language.reader import names
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="publish this machine's digests")
+    parser.add_argument("--new", action="store_true", help="publish those of new scenarios")
     parser.add_argument("--verdicts", action="store_true", help="publish those with verdicts alone")
     parser.add_argument("--pages", nargs="*", help="compare what reports simulate, of some")
     options = parser.parse_args()
@@ -31,12 +33,15 @@ def main() -> None:
         published = conformance.published() | {"verdicts": conformance.verdict_digests()}
         path.write_text(json.dumps(published, indent=1) + "\n", encoding="utf-8")
         return
-    write = options.write
-    known = {} if write else conformance.published()["rows"]
+    write = options.write or options.new
+    known = {} if options.write else conformance.published()["rows"]
     found = {}
     for scenario in names():
         for driver in conformance.DRIVERS:
             key = f"{scenario} {driver}"
+            if options.new and key in known:
+                found[key] = known[key]
+                continue
             try:
                 found[key] = conformance.rows_digest(scenario, driver)
             except InputError as error:

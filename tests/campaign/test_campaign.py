@@ -401,7 +401,7 @@ def test_an_imported_map_is_searched_like_the_map(tmp_path, scenario, junction):
     road_map = tmp_path / "Town05.xodr"
     road_map.write_bytes(TOWN05.read_bytes())
     owl, _ = import_file(road_map)
-    settings = {"algorithm": "random", "budget": 60, "keep": 1, "triage": "none"}
+    settings = {"algorithm": "random", "budget": 200, "keep": 1, "triage": "none"}
     settings |= {"junction": junction}
     one = bg.run_search(scenario, road_map=road_map, out=tmp_path / "one", **settings)
     other = bg.run_search(scenario, road_map=owl, out=tmp_path / "other", **settings)
