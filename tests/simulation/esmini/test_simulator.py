@@ -10,7 +10,7 @@ from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.scenario.language.adversary import adversarial
-from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.reader import load, shipped_text
 
 from ..embedded.storyboards import crossroads, lane, scenario, start
 
@@ -36,6 +36,23 @@ def test_it_is_as_here(esmini, name):
     np.testing.assert_allclose(got.v, expected.v, atol=1e-9)
     np.testing.assert_allclose(got.x, expected.x, atol=0.3)
     np.testing.assert_allclose(got.y, expected.y, atol=0.3)
+
+
+def test_traffic_on_the_left_is_the_mirror_image(esmini, tmp_path):
+    """esmini runs the files, which are mirrored; what it moves is mirrored back."""
+    text = shipped_text("cut-in").decode().replace("others: attentive", "others: scripted")
+    found = []
+    for key in ("", "traffic: left\n"):
+        path = tmp_path / "cut-in.yaml"
+        path.write_text(f"{text}\n{key}")
+        here, there, X = both(load(path), esmini, ego="route-follower")
+        found.append(there.rollout(X))
+    right, left = found
+    assert left.left_hand
+    assert left.status.tolist() == [0] * 4, left.messages
+    assert (left.x != here.rollout(X).x).any()  # esmini has moved somebody
+    for name in ("x", "y", "h", "v"):
+        np.testing.assert_allclose(getattr(left, name), getattr(right, name), atol=1e-9)
 
 
 def test_courses_reach_it(esmini):

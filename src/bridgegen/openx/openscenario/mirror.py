@@ -153,7 +153,7 @@ def _negative(value: Any) -> Any:
     """Return −value; of what parameters give, an expression, and of that one again the value."""
     if not isinstance(value, ParameterRef | Expr):
         return negated(value)
-    return _inverse(value, "-")
+    return _inverse(value, "-(", "-({})")
 
 
 def _turned(value: Any, total: float, has_expressions: bool) -> Any:
@@ -161,21 +161,21 @@ def _turned(value: Any, total: float, has_expressions: bool) -> Any:
 
     As a number it may lose its last bits; if it does not, it is one.
     """
+    turn = 2.0 * math.pi
     if isinstance(value, float):
-        other = (total - value) % (2.0 * math.pi)
-        if not has_expressions or (total - other) % (2.0 * math.pi) == value:
+        other = (total - value) % turn
+        if not has_expressions or (total - other) % turn == value:
             return other
-    return _inverse(value, f"{total!r}-", f"%{2.0 * math.pi!r}")
+    rest = f"{total!r}-({{}})"
+    return _inverse(value, f"{total!r}-(", f"{rest}-floor(({rest})/{turn!r})*{turn!r}")
 
 
-def _inverse(value: Any, head: str, tail: str = "") -> Any:
-    """Return ``head(value)tail``, in brackets with a tail; or what stands in such a one."""
-    text = str(value) if isinstance(value, ParameterRef | Expr) else f"{value!r}"
-    body = text[2:-1] if isinstance(value, Expr) else text
-    before, after = (f"({head}(", f")){tail}") if tail else (f"{head}(", ")")
-    inside = body[len(before) : -len(after)]
-    if not (body.startswith(before) and body.endswith(after) and _is_closed(inside)):
-        return Expr(f"${{{before}{body}{after}}}")
+def _inverse(value: Any, start: str, form: str) -> Any:
+    """Return an expression of a form with the value in it; or what stands in one of that form."""
+    body = str(value)[2:-1] if isinstance(value, Expr) else str(value)
+    inside = _first_bracket(body[len(start) :]) if body.startswith(start) else None
+    if inside is None or form.format(inside, inside) != body:
+        return Expr(f"${{{form.format(body, body)}}}")
     if inside.startswith("$") and inside[1:].isidentifier():
         return ParameterRef(inside)
     try:
@@ -184,11 +184,11 @@ def _inverse(value: Any, head: str, tail: str = "") -> Any:
         return Expr(f"${{{inside}}}")
 
 
-def _is_closed(text: str) -> bool:
-    """Return whether a text closes all brackets that it opens, and no other."""
-    depth = 0
-    for sign in text:
+def _first_bracket(text: str) -> str | None:
+    """Return a text up to the bracket that closes the one before it."""
+    depth = 1
+    for i, sign in enumerate(text):
         depth += (sign == "(") - (sign == ")")
-        if depth < 0:
-            return False
-    return depth == 0
+        if depth == 0:
+            return text[:i]
+    return None
