@@ -45,12 +45,12 @@ def views(found: Views) -> Views:
     return found
 
 
-def answer(given: "tuple[Float, Float] | Plans") -> "tuple[Float, Float] | Plans":
+def answer(given: "tuple[Float, ...] | Plans") -> "tuple[Float, ...] | Plans":
     """Return what the driver answers in the mirror: a curvature, or trajectories."""
     if isinstance(given, Plans):
         return Plans(opposite(given.states, (2, 3)))
-    acceleration, curvature = given
-    return acceleration, opposite(curvature)
+    acceleration, curvature, *demand = given
+    return acceleration, opposite(curvature), *demand
 
 
 def road_map(found: RoadMap) -> RoadMap:
