@@ -17,7 +17,7 @@ KNOWN = {*names(), *pack_names()}
 
 
 def table(text: str, head: str = HEAD):
-    return read_table(read_plain_yaml((head + text).encode(), "mine.yaml"), KNOWN)
+    return read_table(read_plain_yaml((head + text).encode(), "mine.yaml"), KNOWN.__contains__)
 
 
 def columns(scenario, rows: int = 64):
@@ -98,6 +98,14 @@ def test_a_row_moves_the_standard_cells(entry, plain, name, by):
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     assert after.parameters[name].low <= found.min() <= found.max() <= after.parameters[name].high
     assert {grid.score for grid in after.matrix} == {""}
+
+
+def test_what_is_held_is_held_in_all_cells():
+    row = "a: {text: Stops, scenarios: [ncap-aeb/ccfhos], given: {location: 50}}"
+    made = table(f"matrix: 2026 standard\nrows:\n  {row}\n")
+    (grid,) = made.applied("ccfhos-a", load("ncap-aeb/ccfhos")).matrix
+    assert set(grid.columns()["location"]) == {50.0}
+    assert len(grid) == 6  # of 18, which differ in the location by threes
 
 
 def test_night_is_dark_in_all_cells():

@@ -10,6 +10,7 @@ from bridgegen.jobs.preventability.classes import CellClass
 from bridgegen.jobs.preventability.preventability import map_preventability
 from bridgegen.jobs.suite.clauses import clause_results
 from bridgegen.jobs.suite.page import write_suite_page
+from bridgegen.jobs.suite.replay import replay
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.sentences import clause_in_words
 from bridgegen.jobs.suite.shown import json_of_suite, suite_shown
@@ -142,6 +143,9 @@ def test_a_table_s_clauses_are_judged_and_those_without_a_scenario_are_said(tmp_
         assert found.failed == sum(row.critical for row in result.rows)
         assert "u" not in {row.clauses for row in result.rows}
     assert any(one.failed for one in clauses.values())
+    again = replay(out, "cut-in", 3, out=tmp_path / "again")
+    assert again.is_same
+    assert again.is_same_exported  # a file states no clauses, and its result has none
     left = {id for id, *_ in suite.unanswered}
     assert left == {f"ISO34502-{kind.id}" for kind in typologies()["iso-34502"].uncovered}
     if not left:  # all are answered one day

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -83,10 +84,9 @@ def pack_names() -> tuple[str, ...]:
 def pack_tables() -> Mapping[str, PackTable]:
     """Return the packs that ship as tables of clauses, by name."""
     folder = resources.files("bridgegen.scenario.packs")
-    known = {*names(), *pack_names()}
     files = sorted(item.name for item in folder.iterdir() if item.name.endswith(".yaml"))
     read = [read_plain_yaml(folder.joinpath(file).read_bytes(), file) for file in files]
-    tables = [read_table(document, known) for document in read]
+    tables = [read_table(document, lambda name: _shipped(name).is_file()) for document in read]
     return {table.file.pack: table for table in tables}
 
 
@@ -103,8 +103,12 @@ def shipped_text(name: str) -> bytes:
     Args:
         name: of `names` or `pack_names`.
     """
+    return _shipped(name).read_bytes()
+
+
+def _shipped(name: str) -> Traversable:
     folder = "bridgegen.scenario.packs" if "/" in name else "bridgegen.scenario.catalogue"
-    return resources.files(folder).joinpath(f"{name}.yaml").read_bytes()
+    return resources.files(folder).joinpath(f"{name}.yaml")
 
 
 def load(name_or_path: str | Path) -> LogicalScenario:
@@ -120,7 +124,7 @@ def load(name_or_path: str | Path) -> LogicalScenario:
         ScenarioError: it breaks rules; all of them, with file and line.
     """
     pack, _, entry = str(name_or_path).partition("/")
-    if (table := pack_tables().get(pack)) is None:
+    if not entry or (table := pack_tables().get(pack)) is None:
         return build(*document_of(name_or_path))
     if entry not in table.entries:
         raise UnknownNameError("scenario", str(name_or_path), entry_names())

@@ -6,7 +6,7 @@ change nothing share the entry of their scenario. Clauses are violated by what i
 scenario with clauses of its own, by the collisions that violate these.
 """
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from typing import Annotated, Any
@@ -166,8 +166,8 @@ def _cells(grid: Grid, parameter: Parameter, step: float, more: str) -> Grid:
     return replace(grid, name=grid.name + more, values=(), sets=sets, score="", points=0.0)
 
 
-def read_table(document: Document, scenarios: Container[str]) -> PackTable:
-    """Return the table that a file is, which names some of these scenarios.
+def read_table(document: Document, exists: Callable[[str], bool]) -> PackTable:
+    """Return the table that a file is; ``exists`` says whether there is such a scenario.
 
     Raises:
         ScenarioError: it breaks rules; all of them, with file and line.
@@ -186,7 +186,7 @@ def read_table(document: Document, scenarios: Container[str]) -> PackTable:
             name += f"-{key.replace('.', '-')}" if row.given or row.shift else ""
             of, keys = entries.setdefault(name, (scenario, []))
             keys.append(key)
-            if scenario not in scenarios:
+            if not exists(scenario):
                 problems.append(f"rows.{key}: there is no scenario '{scenario}'{where}")
             elif of != scenario:
                 problems.append(f"rows.{key}: '{name}' is both {of} and {scenario}{where}")
