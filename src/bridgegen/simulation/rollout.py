@@ -79,7 +79,8 @@ class Rollout:
         v: ``(N, E, T)`` float64 [m/s], forward speed; < 0 of a body that reverses.
         a: ``(N, E, T)`` float64 [m/s²], forward acceleration applied from this instant on.
         offset: ``(N, E, T)`` float64 [m], signed lateral distance of the reference point from the
-            entity's route (the lane's centre), left positive.
+            entity's route (the lane's centre), left positive; where the ego's route changes lanes,
+            from the lane that it changes from.
         n_steps: ``(N,)`` int64, in 1..T, the recorded instants before the stop trigger fired.
         status: ``(N,)`` int8, a key of ``STATUS_MESSAGES``; 0 is success. Arrays of a failed
             scenario are finite but meaningless.
