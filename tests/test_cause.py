@@ -124,7 +124,7 @@ def test_a_row_s_cause_is_the_same_in_any_batch_and_order(name, ego, monkeypatch
     n = 60
     X = pipeline.space.decode(np.random.default_rng(5).random((n, pipeline.space.n_var)))
     whole = pipeline.evaluate(X)
-    assert len(set(whole.cause.tolist())) > 2
+    assert len(set(whole.cause.tolist())) > (2 if ego == "route-follower" else 1)
     assert ((whole.cause != Cause.NONE) == whole.critical).all()
     monkeypatch.setattr(simulator, "CHUNK", 7)
     order = np.random.default_rng(1).permutation(n)
@@ -195,5 +195,6 @@ def test_the_reference_s_harm_has_every_cause():
         )
         pipeline.choose_objective(BY_THRESHOLDS)
         rows = np.random.default_rng(11).random((120, pipeline.space.n_var))
+        rows[::2, list(pipeline.space.variables).index("precipitation")] = 0.999  # most are dry
         found |= set(pipeline.evaluate(pipeline.space.decode(rows)).cause.tolist())
     assert found == set(Cause) - {Cause.VEHICLE_DYNAMICS}

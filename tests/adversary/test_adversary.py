@@ -160,7 +160,7 @@ def test_a_campaign_searches_its_decisions_and_goes_on(tmp_path):
     assert bg.resume(run.folder).frame().equals(table)
     # A course is no combination of forty speeds: the report leaves the decisions out.
     assert "bv_pace_01" not in run.report.read_text("utf-8").replace("--adversary", "")
-    _, covered = coverage_of(run.folder, strength=2)
+    _, covered, _ = coverage_of(run.folder, strength=2)
     assert {one.name for one in covered.parameters} == {
         *load("crossroads-s1").space().variables
     } - {

@@ -37,7 +37,7 @@ def test_every_figure_is_said(space):
 
 
 def test_the_place_is_in_the_parameter_s_unit(space):
-    free = next(name for name in space.variables if not space.bounds[name])
+    free = next(n for n in space.variables if not (space.bounds[n] or space.parameters[n].prior))
     one = space.parameters[free]
     edge = one.low + (one.high - one.low) * 2 / 3
     said = place_in_words(replace(FOUND, place=Place(free, 2 / 3, 1.0, 0.21, 0.034)), space)

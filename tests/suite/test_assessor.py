@@ -55,6 +55,9 @@ def test_what_is_drawn_lies_where_it_says(name, secret):
     widths = [len({*column}) > 1 for column in space.encode(X[strata == INSIDE]).T]
     assert all(widths)  # every parameter varies
     at_end = np.isclose(U, 0.0, atol=1e-9) | np.isclose(U, 1.0, atol=1e-9)
+    for each in space.variables:  # of a prior, the end of a range is a part of the cube, too
+        ends, x = space.parameters[each], X[strata == BOUND, space.index(each)]
+        at_end |= (np.isclose(x, ends.low) | np.isclose(x, ends.high))[:, np.newaxis]
     apart = [bool(level) for level in space.levels]  # whole numbers: an end is a part of the cube
     assert (at_end.any(axis=1) | any(apart)).all()
     published = rows_of(scenario, space, 100, 0).X

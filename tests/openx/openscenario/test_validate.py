@@ -29,7 +29,7 @@ def test_what_we_write_is_right_on_every_road_network(individuals, scenario_name
         ('<Private entityRef="bv">', '<Private entityRef="car">',
          "entityRef of Private must be one of ego, bv, got 'car'"),
         ('<EntityRef entityRef="bv"/>', '<EntityRef entityRef="$road_wetness"/>',
-         "entityRef of EntityRef must be one of ego, bv, got 'wetWithPuddles'"),
+         "entityRef of EntityRef must be one of ego, bv, got 'dry'"),
         ('entityRef="ego" rel', 'entityRef="bvx" rel', "RelativeDistanceCondition must be one"),
         ('<ScenarioObject name="bv">', '<ScenarioObject name="ego">',
          "the name of a ScenarioObject must be its own, got 'ego' twice"),
