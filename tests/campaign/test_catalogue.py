@@ -29,7 +29,11 @@ def test_a_smoke_search(tmp_path, name):
     files = write_scenario(pipeline, rows.X[7], tmp_path, "one")
     assert [problem for file in files for problem in validate_file(file)] == []
     result = simulate_file(files[2])
-    np.testing.assert_array_equal([result.metrics[m] for m in pipeline.metrics], rows.metrics[7])
+    # Files do not state criteria, so their margins are of a search alone.
+    there = [m in result.metrics for m in pipeline.metrics]
+    assert sum(there) == len(there) - len(scenario.criteria)
+    found = [result.metrics.get(m) for m in pipeline.metrics]
+    np.testing.assert_array_equal(np.compress(there, found), np.compress(there, rows.metrics[7]))
 
 
 @pytest.mark.parametrize("name", names())
@@ -44,6 +48,9 @@ def test_neither_driver_is_never_or_always_at_risk(name):
         X = space.decode(np.random.default_rng(1).random((300, space.n_var)))
         shares.append(float(pipeline.evaluate(X).critical.mean()))
     careless, careful = shares
-    assert careless > 0.0
     assert careful < 0.7
+    if scenario.story.ghosts:  # which only a driver that perceives meets
+        assert careless == 0.0 < careful
+        return
+    assert careless > 0.0
     assert careful <= careless + 0.05
