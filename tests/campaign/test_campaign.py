@@ -381,7 +381,7 @@ def test_on_a_map_the_roads_are_the_map_s(tmp_path):
     with refuses(InputError):
         bg.run_search("crossroads-s4", road_map=TOWN05, axes=["static"], out=tmp_path / "none")
     run = bg.run_search(
-        "crossroads-s2", road_map=TOWN05, algorithm="random", budget=80, keep=1, triage="none",
+        "crossroads-s2", road_map=TOWN05, algorithm="random", budget=400, keep=1, triage="none",
         out=tmp_path / "r",
     )  # fmt: skip
     frame = run.frame()

@@ -46,7 +46,7 @@ def test_defaults_are_driven_without_harm(name: str, ideal: str) -> None:
         assert astray.sum() * rollout.time_step < 2 * 5.0  # s, between two lanes
         assert not astray[-1]
         assert -0.5 < offset.min() < offset.max() < lane + 0.5
-    else:
+    elif not scenario.ego.change and not scenario.story.ghosts:  # else it changes lanes
         assert found["l_offset"] < 0.5
     travelled = np.hypot(*np.diff([rollout.x[0, 0], rollout.y[0, 0]], axis=1)).sum()
     assert travelled > 20.0  # standing still would be harmless, too

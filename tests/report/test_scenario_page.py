@@ -201,7 +201,8 @@ def test_the_page_says_everything(tmp_path, name):
     text = show_scenario(name, tmp_path / "page.html").read_text("utf-8")
     for parameter in scenario.parameters.values():
         assert f'<th scope="row">{parameter.name}</th>' in text
-    assert text.count("<dt>") == len(scenario.bounds) + len(scenario.derived)
+    stated = (scenario.bounds, scenario.derived, scenario.criteria)
+    assert text.count("<dt>") == sum(map(len, stated))
     assert not re.findall(r"""(?:src|href)=["'](?!data:,|#)""", text)  # nothing is fetched
     # its data and its own script, where it simulates
     simulates = "It is not simulated in this page" not in text

@@ -44,7 +44,7 @@ class World:
     """A pipeline whose harm is ``harm(values, fix)`` of the rows; ``label`` names their type."""
 
     cause, baseline, seeks_causes, tries, metrics = None, None, True, True, METRICS
-    preventable, draws = True, False
+    preventable, draws, left_hand = True, False, False
 
     def __init__(
         self, space, harm, fixes=(), label=None, fails=None, seen=(), spoiled=None, rule=None

@@ -77,7 +77,7 @@ def _typologies(scenarios: Sequence[str]) -> Listed:
 
 @_of("packs")
 def _packs() -> Listed:
-    """Logical scenarios of the packs, by regulation, with the clauses that they answer."""
+    """Logical scenarios of the packs, with their clauses."""
     from bridgegen.scenario.language.reader import load, pack_names, pack_tables
 
     read = cache(load)
