@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from tests.approval import approve
 
+import bridgegen as bg
 from bridgegen.drivers.planners import DOMAINS
 from bridgegen.engine.domain import in_words, needed, outside
 from bridgegen.engine.options import PipelineOptions
@@ -69,3 +70,22 @@ def test_a_driver_outside_its_domain_is_named(scenario, ego, said):
     assert bool(found) == bool(said)
     assert said in found
     assert not found or found.startswith(f"outside the domain of {ego} (motorway): {scenario} has")
+
+
+@pytest.mark.parametrize(
+    ("ego", "ideal", "sees_the_truth"),
+    [
+        ("route-follower", (), True),
+        ("careful", (), True),
+        ("reference", ("perception",), True),
+        ("reference", (), False),
+    ],
+)
+def test_who_meets_no_ghosts_is_not_said_to_pass_them(tmp_path, ego, ideal, sees_the_truth):
+    run = bg.run_search(
+        "phantom-braking", ego=ego, ideal=ideal, algorithm="random", budget=20, keep=0,
+        triage="none", out=tmp_path / "run",
+    )  # fmt: skip
+    assert (run.verdict == "not judged") == sees_the_truth
+    said = "sees what is there, and so none of the ghosts of phantom-braking"
+    assert (said in (run.folder / "report.html").read_text("utf-8")) == sees_the_truth

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float
-from bridgegen.drivers import Driver
+from bridgegen.drivers import STORYBOARD, Driver
 from bridgegen.drivers.planners import DOMAINS
 from bridgegen.openx.opendrive.geometry import reference_pose
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.scenario.participants import PARTICIPANTS
+from bridgegen.simulation.embedded.program import Program
 
 if TYPE_CHECKING:
     from bridgegen.engine.runner import Runner
@@ -29,14 +30,24 @@ VULNERABLE = frozenset({"pedestrian", "bicycle"})
 
 
 def outside(runner: "Runner") -> str:
-    """Return a sentence if the ego's driver says that it is not made for the scenario; else "".
+    """Return a sentence if the scenario says nothing of the ego's driver, which passes it; else "".
 
-    A driver for motorways may also follow a road on which there are lanes, but at first nobody,
-    the other way.
+    The driver says that it is not made for the scenario, or it meets none of its ghosts. A driver
+    for motorways may also follow a road on which there are lanes, but at first nobody, the other
+    way.
     """
-    if not runner.driver.domain:
+    driver, name = runner.driver, runner.scenario.name
+    if why := unhaunted(driver, name, runner.embedded.program):
+        return why
+    return why_outside(driver, name, *needed_by(runner)) if driver.domain else ""
+
+
+def unhaunted(driver: Driver, name: str, program: Program) -> str:
+    """Return a sentence if a scenario has ghosts and the ego's driver sees none; else ""."""
+    perceives = driver.perceives and "perception" not in driver.ideal
+    if driver == STORYBOARD or perceives or not len(program.ghosts):
         return ""
-    return why_outside(runner.driver, runner.scenario.name, *needed_by(runner))
+    return f"{driver.label} sees what is there, and so none of the ghosts of {name}"
 
 
 def why_outside(driver: Driver, name: str, needs: frozenset[str], is_met: bool) -> str:

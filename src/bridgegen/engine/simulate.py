@@ -22,7 +22,7 @@ from bridgegen.assess.metrics import Need
 from bridgegen.base.errors import FileFormatError, UnknownNameError
 from bridgegen.drivers import STORYBOARD
 from bridgegen.drivers.kinds import NAMES
-from bridgegen.engine.domain import against_ego, needed, why_outside
+from bridgegen.engine.domain import against_ego, needed, unhaunted, why_outside
 from bridgegen.engine.options import checked
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import validate as openscenario_validate
@@ -226,13 +226,16 @@ def _unjudged(rollout: Rollout, conflicts: Conflicts, *, may_stop: bool) -> str:
 def _outside(
     embedded: EmbeddedSimulator, roads: OpenDrive, network: Network, rollout: Rollout, name: str
 ) -> str:
-    """Return a sentence if the ego's driver is not made for the scenario; "" if it is."""
+    """Return a sentence if the scenario says nothing of the ego's driver; "" if it does."""
     if embedded.program.driver == STORYBOARD or rollout.status[0]:
         return ""
+    program = embedded.program
+    if why := unhaunted(program.driver, name, program):
+        return why
     headings = rollout.h[0, :, 0]
     kinds = [NAMES[kind] for kind in rollout.kinds[1:].tolist()]
     needs = needed(roads, network.roads_ahead(0), headings, kinds)
-    return why_outside(embedded.program.driver, name, needs, bool(against_ego(headings).any()))
+    return why_outside(program.driver, name, needs, bool(against_ego(headings).any()))
 
 
 def _stated_cause(scenario: OpenScenario) -> str | None:
