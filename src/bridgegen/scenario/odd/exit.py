@@ -54,15 +54,22 @@ class Watched:
 
     def to_lines(self) -> tuple[str, ...]:
         """Return in words what may be left, and what is not followed."""
-        groups = (
-            " or ".join(f"{x.low:g} <= {x.name} <= {x.high:g}" for x in group)
-            for group in self.limits
-        )
-        lines = [f"the ODD is left where the weather does not keep {', '.join(groups) or '–'}"]
+        groups = (" or ".join(_in_words(limit) for limit in group) for group in self.limits)
+        lines = [f"the weather is within the ODD where {', '.join(groups)}"]
+        if not self.limits:
+            lines = ["no weather leaves the ODD"]
         if self.gaps:
             each = "; ".join(f"{name}: {why}" for name, why in self.gaps.items())
             lines.append(f"of the ODD a drive does not follow: {each}")
         return tuple(lines)
+
+
+def _in_words(limit: Limit) -> str:
+    """Return a limit as a person writes it: only the ends that there are."""
+    if limit.high == math.inf:
+        return f"{limit.name} ≥ {limit.low:g}"
+    low = f"{limit.low:g} ≤ " if limit.low > -math.inf else ""
+    return f"{low}{limit.name} ≤ {limit.high:g}"
 
 
 def watched(scenario: LogicalScenario, *, on_map: bool = False) -> Watched | None:
