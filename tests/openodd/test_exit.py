@@ -191,3 +191,11 @@ def test_a_criterion_on_the_domain_needs_one():
 def test_limits_that_cannot_be_read_are_refused(text):
     with refuses(InputError, "wind_speed" if "wind" in text else "got"):
         read_limits(text)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("fog-thickens", "visual_range ≥ 200"), ("rain-sets-in", "rain ≤ 7.6")],
+)
+def test_limits_that_touch_are_said_as_one(name, said):
+    assert watched(load(name)).to_lines() == (f"the weather is within the ODD where {said}",)

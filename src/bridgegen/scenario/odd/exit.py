@@ -4,8 +4,8 @@ All else that a scenario states, such as its roads, stays as it is at the start.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bridgegen.base.errors import ScenarioError
@@ -54,7 +54,7 @@ class Watched:
 
     def to_lines(self) -> tuple[str, ...]:
         """Return in words what may be left, and what is not followed."""
-        groups = (" or ".join(_in_words(limit) for limit in group) for group in self.limits)
+        groups = map(_in_words, self.limits)
         lines = [f"the weather is within the ODD where {', '.join(groups)}"]
         if not self.limits:
             lines = ["no weather leaves the ODD"]
@@ -64,12 +64,23 @@ class Watched:
         return tuple(lines)
 
 
-def _in_words(limit: Limit) -> str:
-    """Return a limit as a person writes it: only the ends that there are."""
-    if limit.high == math.inf:
-        return f"{limit.name} ≥ {limit.low:g}"
-    low = f"{limit.low:g} ≤ " if limit.low > -math.inf else ""
-    return f"{low}{limit.name} ≤ {limit.high:g}"
+def _in_words(group: Sequence[Limit]) -> str:
+    """Return limits, of which one holds, as a person writes them: what touches is one."""
+    joined: list[Limit] = []
+    for limit in sorted(group, key=lambda limit: (limit.name, limit.low)):
+        last = joined[-1] if joined else None
+        if last and last.name == limit.name and limit.low - last.high <= CLOSE * abs(limit.low):
+            joined[-1] = replace(last, high=max(last.high, limit.high))
+        else:
+            joined.append(limit)
+    said = []
+    for name, low, high in ((each.name, each.low, each.high) for each in joined):
+        if high == math.inf:
+            said.append(f"{name} ≥ {low:g}")
+        else:  # what is never below 0 needs no lower end there
+            above = low >= 0.0 or (name == "sun_elevation" and low > -math.inf)
+            said.append(f"{low:g} ≤ {name} ≤ {high:g}" if above else f"{name} ≤ {high:g}")
+    return " or ".join(said)
 
 
 def watched(scenario: LogicalScenario, *, on_map: bool = False) -> Watched | None:
