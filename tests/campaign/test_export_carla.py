@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from lxml import etree
 from tests.approval import refuses
+from tests.covering import covering
 
 import bridgegen as bg
 from bridgegen.base.errors import InputError, UnsupportedError
@@ -17,11 +18,11 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.reader import load
 
 MM = 1e-3
 ANIMALS = ("animal-on-road", "behind-the-corner")  # CARLA has none
-WITHOUT_ANIMALS = [name for name in names() if name not in ANIMALS]
+WITHOUT_ANIMALS = [name for name in covering() if name not in ANIMALS]
 
 
 @pytest.fixture(scope="module")

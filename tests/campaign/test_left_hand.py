@@ -10,6 +10,7 @@ import csv
 import numpy as np
 import pytest
 from tests.approval import approve, refuses
+from tests.covering import covering
 
 from bridgegen.assess.conflict.analysis import Responsible, Rule, analyse
 from bridgegen.assess.conflict.findings import Findings
@@ -30,7 +31,7 @@ from bridgegen.openx.opendrive.validate import problems
 from bridgegen.pages.playbacks import nominal_playback
 from bridgegen.pages.scenario_page import story_lines
 from bridgegen.scenario.countries import COUNTRIES, in_the_mirror
-from bridgegen.scenario.language.reader import load, names, shipped_text
+from bridgegen.scenario.language.reader import load, shipped_text
 from bridgegen.simulation.trace import write_trace
 
 MOTION = ("x", "y", "h", "v", "a", "offset", "began", "n_steps", "detections", "lights", "friction")
@@ -60,7 +61,7 @@ def assert_same(got, expected, names_=MOTION):
         np.testing.assert_array_equal(getattr(got, name), getattr(expected, name), err_msg=name)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", covering())
 def test_a_mirrored_scenario_has_the_mirrored_result(keyed, tmp_path, name):
     here, X = rows(load(name), 3)
     there, other = rows(keyed(name, "traffic: left"), 3)

@@ -4,10 +4,11 @@ import json
 
 import pytest
 from tests.approval import approve, refuses
+from tests.covering import covering
 
 from bridgegen.base.errors import InputError, StorageError, UnknownNameError
 from bridgegen.scenario.language.json_schema import schema
-from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.language.starter import start_scenario
 
 
@@ -20,7 +21,7 @@ def test_it_is_valid_and_says_what_each_section_is(tmp_path):
     assert "NAME" not in text
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", covering())
 def test_a_copy_differs_in_its_name_only(tmp_path, name):
     copy, original = load(start_scenario("mine", like=name, folder=tmp_path)), load(name)
     assert copy.name == "mine"

@@ -3,9 +3,10 @@
 import pyoxigraph as ox
 import pytest
 from tests.approval import approve, refuses
+from tests.covering import covering
 
 from bridgegen.base.errors import InputError, OntologyError
-from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.ontology import reasoner as module
 from bridgegen.scenario.ontology.check import check
 from bridgegen.scenario.ontology.files import save
@@ -57,7 +58,7 @@ def test_the_ontology_is_consistent_and_every_class_can_have_individuals():
 
 
 @reasoning
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", covering())
 def test_every_scenario_of_the_catalogue_is_consistent(name):
     scenario = load(name)
     values = scenario.space().values(scenario.space().row({}))
@@ -118,7 +119,7 @@ def test_every_class_of_the_ontology_can_have_an_individual():
 
 
 @reasoning
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", covering())
 def test_the_catalogue_is_consistent(name, individuals_of):
     found = reason(individuals_of(name))
     assert found.problems == []

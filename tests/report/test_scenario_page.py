@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from tests.approval import approve, refuses
+from tests.covering import covering
 from tests.pages import without_theme
 
 from bridgegen.base.errors import InputError, StorageError, UnknownNameError
@@ -18,14 +19,14 @@ from bridgegen.pages.birdseye import INK, MARKING, PLAYERS
 from bridgegen.pages.playbacks import playbacks
 from bridgegen.pages.scenario_page import show_scenario, story_lines
 from bridgegen.pages.sketch import HEIGHT, WIDTH, sketch
-from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.language.starter import start_scenario
 from bridgegen.simulation.embedded import portable
 
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", covering())
 def test_the_picture_shows_everybody_who_matters(name):
     scenario = load(name)
     text = sketch(Pipeline(scenario, scenario.space()).runner)
@@ -195,7 +196,7 @@ def test_the_page_names_the_rule_that_counts(driveway, objective, rule):
     assert f"<li>{rule}" in show_scenario(str(driveway)).read_text("utf-8")
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", covering())
 def test_the_page_says_everything(tmp_path, name):
     scenario = load(name)
     text = show_scenario(name, tmp_path / "page.html").read_text("utf-8")

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
+from tests.covering import covering
 
 from bridgegen.openx.convert import convert_file, import_file, scenario_of
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
@@ -19,7 +20,7 @@ from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.ontology.check import check
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.individuals import build
@@ -53,7 +54,7 @@ def imported(data: bytes, roads: OpenDrive, **options) -> Individuals:
 # -- laws over the catalogue -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", covering())
 def test_the_individuals_of_layers_3_to_5_come_back(name):
     if load(name).ego.change:
         pytest.skip("a route that changes lanes goes into files, and does not come back")
