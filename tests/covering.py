@@ -15,9 +15,15 @@ from bridgegen.scenario.language.reader import names
 
 NAMED = {"participants", "events", "places", "jams", "road_works", "ghosts", "legs"}
 """Keys below which names are free."""
-WORDS = {"type", "kind", "lane", "way", "template", "indicate", "driver", "others", "traffic", "rules", "sign", "shape", "road_type"}  # fmt: skip
+WORDS = {
+    *("driver", "indicate", "kind", "lane", "others", "road_type", "rules", "shape", "sign"),
+    *("template", "traffic", "type", "way"),
+}
 """Keys whose values are words of the language."""
-OF_STORY = {"template", "roads", "others", "participants", "events", "jams", "road_works", "ghosts", "odd", "criteria", "traffic", "rules", "include"}  # fmt: skip
+OF_STORY = {
+    *("template", "roads", "traffic", "rules", "others", "participants", "events", "jams"),
+    *("road_works", "ghosts", "odd", "criteria", "include"),
+}
 """Keys of a scenario that say what is simulated, but for numbers."""
 
 
