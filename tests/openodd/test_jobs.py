@@ -46,6 +46,11 @@ def test_a_search_stays_inside_and_records_the_odd_with_its_contents(folder):
     assert "ODD my_odd, 2 conditions not judged" in run.report.read_text(encoding="utf-8")
 
 
+def test_what_is_said_of_the_weather_names_that_it_is_drawn_from_a_part(folder, cli):
+    said = "weather as it is met within its ranges, all else uniform"
+    assert bg.Run(folder / "run").triage.bound.space.measure == said
+
+
 def test_what_it_exports_has_its_current_operational_domain(folder):
     (exported,) = bg.Run(folder / "run").exported()
     names = {Path(name).name for name in exported.files}

@@ -42,7 +42,9 @@ _MARGIN = {
 }
 
 
-def estimate(drawn: Drawn, harmful: int, rows: int, *, met: bool = False) -> Estimate:
+def estimate(
+    drawn: Drawn, harmful: int, rows: int, *, met: bool = False, within: bool = False
+) -> Estimate:
     """Estimate a share of the space from independent rows, with its exact interval.
 
     Args:
@@ -50,6 +52,7 @@ def estimate(drawn: Drawn, harmful: int, rows: int, *, met: bool = False) -> Est
         harmful: number of harmful rows.
         rows: number of rows with a result.
         met: whether parameters were drawn as often as their priors say.
+        within: whether only a part of what these span was drawn.
 
     Source: C. Clopper and E. Pearson, Biometrika 26 (1934); 95 %, two-sided.
     """
@@ -59,7 +62,14 @@ def estimate(drawn: Drawn, harmful: int, rows: int, *, met: bool = False) -> Est
     low, high = clopper_pearson(harmful, rows)
     share = harmful / rows if rows else None
     return Estimate(
-        drawn=drawn, rows=rows, harmful=harmful, share=share, low=low, high=high, met=met
+        drawn=drawn,
+        rows=rows,
+        harmful=harmful,
+        share=share,
+        low=low,
+        high=high,
+        met=met,
+        within=within,
     )
 
 

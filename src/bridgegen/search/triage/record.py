@@ -67,6 +67,7 @@ class Estimate(_Model):
         low: lower end of the two-sided 95 % Clopper-Pearson interval.
         high: its upper end, also where no row is harmful: a one-sided 97.5 % upper bound.
         met: whether parameters were drawn as often as their priors say; else all evenly.
+        within: whether some of these parameters were kept to a part of what their priors span.
     """
 
     drawn: Drawn
@@ -76,11 +77,14 @@ class Estimate(_Model):
     low: Share
     high: Share
     met: bool = False
+    within: bool = False
 
     @property
     def measure(self) -> str:
         """By which measure of the space, in words."""
-        return "weather as it is met, all else uniform" if self.met else "uniform over the ranges"
+        if not self.met:
+            return "uniform over the ranges"
+        return f"weather as it is met{' within its ranges' * self.within}, all else uniform"
 
 
 class FreshRows(_Model):
