@@ -44,3 +44,24 @@ def test_it_stops_before_the_line_and_goes_on_at_green(red: Path, ego: str) -> N
     assert crossed == 0
     assert v.min() < 0.5
     assert v[-1] > 3.0
+
+
+def test_an_offset_within_a_phase_shifts_the_whole_cycle(tmp_path: Path) -> None:
+    """A controller once began that phase anew, and contradicted the changes beside it."""
+    text = (
+        resources.files("bridgegen.scenario.catalogue")
+        .joinpath("red-light-runner.yaml")
+        .read_text()
+    )
+    found = {}
+    for offset in (0.0, 5.0):
+        path = tmp_path / f"{offset:g}.yaml"
+        timing = f"green_time: 6.0, signal_offset: {offset}"
+        path.write_text(text.replace("green_time: 30.0, signal_offset: 5.0", timing))
+        scenario = load(path)
+        pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego="reference"))
+        rollout = pipeline.rollout(pipeline.space.row({})[np.newaxis])
+        found[offset] = rollout.lights[0][:, : int(rollout.n_steps[0])]
+    steps, n = 100, min(each.shape[1] for each in found.values())
+    assert n > 200  # of 0.05 s: more than the shifted first phase and the next one
+    assert np.array_equal(found[5.0][:, : n - steps], found[0.0][:, steps:n])
