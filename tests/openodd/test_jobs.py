@@ -111,8 +111,11 @@ def test_a_suite_does_not_run_what_is_outside(tmp_path):
 
 def test_a_suites_variations_are_run_again_in_its_odd(tmp_path, cli):
     key, out, suite = str(tmp_path / "key"), str(tmp_path / "out"), ["suite"]
-    assert cli(*suite, "commit", "cut-in", "--key", key, "--number", "10")[0] == 0
-    words = ["cut-in", "--ego", "route-follower", "--odd", str(EXAMPLE), "--out", out]
+    given = ["--odd", str(EXAMPLE)]
+    assert cli(*suite, "commit", "cut-in", "--key", key, "--number", "10", *given)[0] == 0
+    code, _, err = cli(*suite, "cut-in", "--assessor", key)
+    assert (code, "as the key says; not: odd" in err) == (2, True), err
+    words = ["cut-in", "--ego", "route-follower", *given, "--out", out]
     cli(*suite, *words, "--assessor", key)
     code, said, err = cli(*suite, "verify", f"{out}/sealed.json", "cut-in", "--ego=route-follower")
     assert (code, "to the bit" in said) == (0, True), err
