@@ -102,11 +102,17 @@ def test_the_dashboard_shows_the_projects_odd_and_counts_other_runs_against_it(f
     assert other.others == {"my_odd"}
 
 
-def test_a_suite_does_not_run_what_is_outside(tmp_path):
+def test_a_suite_does_not_run_what_is_outside_and_counts_in_the_dashboard(tmp_path):
+    run_suite("cut-in", samples=20, out=tmp_path / "free")
     suite = run_suite(["cut-in", "lead-brakes"], samples=1, odd=EXAMPLE, out=tmp_path / "suite")
     problems = {result.entry: result.problem for result in suite.results}
     assert problems["cut-in"] == ""
     assert "excludes every row of lead-brakes" in problems["lead-brakes"]
+    odd = build_dashboard(tmp_path).project.odd
+    assert (odd.coverage.odd.name, odd.entries, odd.unread) == ("motorway-odd", 2, 0)
+    assert odd.coverage.evaluations + odd.outside == 21 + 2  # each with the defaults
+    assert 0 < odd.outside < 21
+    assert "0 runs and 2 entries of suites" in (tmp_path / "dashboard.html").read_text("utf-8")
 
 
 def test_a_suites_variations_are_run_again_in_its_odd(tmp_path, cli):

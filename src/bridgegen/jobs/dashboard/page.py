@@ -552,13 +552,15 @@ def _of_odd(odd: ProjectOdd) -> dict[str, Any] | None:
     found = odd.coverage
     if found is None:
         return None
+    entries = counted(odd.entries, "entry of suites", "entries of suites")
     words = [
-        f"{counted(odd.runs, 'run')}: {counted(found.evaluations, 'evaluation')} inside, of which "
+        f"{counted(odd.runs, 'run')}{f' and {entries}' if odd.entries else ''}: "
+        f"{counted(found.evaluations, 'evaluation')} inside, of which "
         f"{found.failures:,} fail; {odd.outside:,} outside",
         found.pairs_in_words,
     ]
-    words += [f"not read of {counted(odd.unread, 'run')}"] if odd.unread else []
-    words += [f"other ODDs bound runs, too: {joined(sorted(odd.others))}"] if odd.others else []
+    words += [f"not read of {counted(odd.unread, 'result')}"] if odd.unread else []
+    words += [f"other ODDs bound results, too: {joined(sorted(odd.others))}"] if odd.others else []
     rows = [
         [
             each.name,

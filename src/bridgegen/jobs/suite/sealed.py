@@ -56,8 +56,10 @@ most: a sealed file of more could not be read."""
 
 
 class Key(Strict):
-    """An assessor's key: 32 random bytes, of which scenarios (digests by name) it draws, and what
-    bounds and judges them."""
+    """An assessor's key: 32 random bytes, of which scenarios it draws, and what judges these.
+
+    Scenarios are digests by name; ``judged`` has the settings that bound and judge.
+    """
 
     assessor: Literal[1] = 1
     secret: str = Field(pattern="^[0-9a-f]{64}$")
@@ -126,8 +128,8 @@ def hash_of(model: BaseModel, without: str) -> str:
 def _judged(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return what of a suite's settings bounds and judges, an ODD by its digest."""
     names = ("criteria", "critical", "count", "others", "empty_trigger")
-    odd = (settings.get("odd") or {}).get("sha256")
-    return {"odd": odd} | json.loads(json.dumps({name: settings[name] for name in names}))
+    found: dict[str, Any] = json.loads(json.dumps({name: settings[name] for name in names}))
+    return {"odd": (settings.get("odd") or {}).get("sha256")} | found
 
 
 def commit(path: Path, files: Sequence[str], number: int, **judged: Any) -> list[str]:
@@ -278,8 +280,10 @@ def _jobs(
 def _again(
     path: Path, sealed: Sealed, jobs: Sequence[tuple[Job, EntryResult]], ego: str
 ) -> tuple[list[str], bool]:
-    """Return what a driver makes of the sealed variations: the same again, or a re-test, which
-    fails as a suite does."""
+    """Return what a driver makes of the sealed variations: the same again, or a re-test.
+
+    A re-test fails as a suite does.
+    """
     own = identity_of(ego, digest_of(ego))
     who = [identity_of(old.ego or old.driver, old.driver_digest) for _, old in jobs]
     same = [pair for pair, driver in zip(jobs, who, strict=True) if driver.content == own.content]
