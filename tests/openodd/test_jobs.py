@@ -9,14 +9,17 @@ import pytest
 from tests.approval import approve, refuses
 
 import bridgegen as bg
-from bridgegen.base.errors import InputError, ScenarioError, UnsupportedError
+from bridgegen.base.errors import InputError, ScenarioError
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.jobs.dashboard.dashboard import build_dashboard
 from bridgegen.jobs.preventability.preventability import map_preventability
 from bridgegen.jobs.risk.risk import estimate_risk
 from bridgegen.jobs.search.campaign import resume
+from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.jobs.search.scenarios import load, within
 from bridgegen.jobs.suite.suite import run_suite
 from bridgegen.results.store import Store
+from bridgegen.scenario.odd.states import states_of
 
 HERE = Path(__file__).parent
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/motorway-odd.yaml"
@@ -146,12 +149,36 @@ def test_a_run_file_names_the_odd_and_is_read_again(tmp_path, cli):
     assert first == second
 
 
-def test_a_scenario_file_and_a_scenario_outside_are_refused(tmp_path):
+def test_a_scenario_outside_is_refused():
     with refuses(ScenarioError, "roundabout-entry"):
         within(load("roundabout-entry"), EXAMPLE)
-    run = bg.run_search("cut-in", ego="route-follower", budget=4, keep=1, out=tmp_path / "run")
-    with refuses(UnsupportedError, "0001"):
-        within(load(run.scenarios[0]), EXAMPLE)
+
+
+def test_a_scenario_file_is_bounded_by_its_weather_speed_and_participants(tmp_path):
+    """As the scenario is that it was written of; its map is not read."""
+    pipeline = Pipeline(logical := load("cut-in"), logical.space())
+    row = pipeline.space.row({"fog_density": 60.0, "precipitation": 20.0, "wind_intensity": 30.0})
+    write_scenario(pipeline, row, tmp_path, "exported")
+    file = load(tmp_path / "exported.xosc")
+    found, states = file.states(), states_of(logical)
+    for name, formula in found.quantities.items():
+        expected = states.quantities[name].evaluate(pipeline.space.values(row))
+        assert float(formula.evaluate(file.usual_values())) == pytest.approx(
+            expected, abs=0.51 * (name == "cloud")
+        )
+    assert {*found.quantities} == {
+        "rain", "visual_range", "wind", "friction", "sun_altitude", "illuminance", "cloud",
+        "ego_speed",
+    }  # fmt: skip
+    assert found.others == ((("car",), ""),)
+    text = "ODD:\n  m:\n    INCLUDE_AND:\n      visibility: '{} 420 m'\n      lane_width: '> 9 m'\n"
+    for sign in ("<", ">"):
+        (tmp_path / f"{sign}.yaml").write_text(text.format(sign))
+    assert within(file, tmp_path / "<.yaml").odd.gaps == {
+        "lane_width > 9 m": "not read of an OpenSCENARIO file"
+    }
+    with refuses(ScenarioError, "visibility > 420 m"):
+        within(file, tmp_path / ">.yaml")
 
 
 def test_a_risk_inside_states_no_rate_of_all_encounters(tmp_path, cli):

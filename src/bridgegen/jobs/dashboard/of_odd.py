@@ -19,7 +19,6 @@ from bridgegen.jobs.suite.replay import job_of
 from bridgegen.jobs.suite.results import EntryResult
 from bridgegen.jobs.suite.suite import SuiteRun
 from bridgegen.results.store import Store
-from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.odd.bounding import Fit, fit_of
 from bridgegen.scenario.odd.coverage import OddCoverage, odd_coverage
 from bridgegen.scenario.odd.reader import Odd, odd_of
@@ -123,7 +122,7 @@ def _of_run(settings: Settings, odd: Odd) -> tuple[Fit, None] | None:
     read = load(settings.scenario, settings.distribution, settings.empty_trigger)
     scenario = driven_by(read, settings.others)
     bound = within(scenario, settings.odd, settings.road_map)
-    if bound.fingerprint != settings.fingerprint or not isinstance(scenario, LogicalScenario):
+    if bound.fingerprint != settings.fingerprint:
         return None
     return fit_of(scenario, odd, on_map=settings.road_map is not None), None
 
@@ -132,7 +131,7 @@ def _of_entry(suite: SuiteRun, result: EntryResult, odd: Odd) -> tuple[Fit, Floa
     """Return the ODD for a suite's entry, and the rows that the suite has run of it."""
     job = job_of(suite, result)
     scenario = scenario_of(replace(job, options=replace(job.options, odd=None)))
-    if job.entry.digest != result.digest or not isinstance(scenario, LogicalScenario):
+    if job.entry.digest != result.digest:
         return None
     bound = scenario_of(job)
     X = run_of(job, bound, bound.space()).X

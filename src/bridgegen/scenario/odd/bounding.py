@@ -11,7 +11,7 @@ from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import ScenarioError
 from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.parameters import Axis, Bound, Parameter
-from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.scenario.odd.reader import Condition, Group, Odd
 from bridgegen.scenario.odd.states import (
     LONG,
@@ -123,7 +123,7 @@ class Fit:
         return (*lines, *(f"{name}: {note}" for note in self.odd.notes))
 
 
-def bounded(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> LogicalScenario:
+def bounded(scenario: SearchedScenario, odd: Odd, *, on_map: bool = False) -> SearchedScenario:
     """Return a scenario all of whose rows lie in an ODD, as far as it states its attributes.
 
     Ranges are narrowed where a condition asks for it; combinations become bounds of what is
@@ -150,7 +150,7 @@ def bounded(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> Log
     return replace(found, notes=(*scenario.notes, *maker.tried(found), *fit.to_lines()))
 
 
-def fit_of(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> Fit:
+def fit_of(scenario: SearchedScenario, odd: Odd, *, on_map: bool = False) -> Fit:
     """Return what an ODD asks of a scenario's rows; the scenario stays as it is.
 
     Args:
@@ -260,7 +260,7 @@ def _met(clause: tuple[Term, ...], columns: Mapping[str, Any], n: int) -> Bool:
 class _Maker:
     """Brings clauses into a scenario, one after the other."""
 
-    def __init__(self, scenario: LogicalScenario, where: str) -> None:
+    def __init__(self, scenario: SearchedScenario, where: str) -> None:
         self.scenario, self.where = scenario, where
         self.checks: list[Bound] = []
         self.declared, self.narrowed = scenario.parameters, dict[str, list[str]]()
@@ -351,6 +351,8 @@ class _Maker:
 
     def _narrow(self, name: str, clause: tuple[Term, ...], said: str) -> bool:
         parameter = self.scenario.parameters[name]
+        if getattr(parameter, "distribution", None) is not None:
+            return False  # a file gives how it is drawn, whatever its range
         ends = self._interval(name, clause)
         span = parameter.kind.span_text(
             parameter.low, parameter.high, "{:.4g}".format, f" {parameter.unit}"
@@ -386,7 +388,8 @@ class _Maker:
         """Bound a parameter by the others of a clause; say whether that was possible."""
         own = tuple(term for term in clause if self._sources(term.formula) == {name})
         others = tuple(term for term in clause if term not in own)
-        if not own or any(name in self._sources(term.formula) for term in others):
+        drawn = getattr(self.scenario.parameters[name], "distribution", None)
+        if drawn or not own or any(name in self._sources(term.formula) for term in others):
             return False
         ends = self._interval(name, own)
         if ends is False:
@@ -421,7 +424,7 @@ class _Maker:
         )
         self.changes.append(f"{said}: rows that break it are refused")
 
-    def tried(self, scenario: LogicalScenario) -> tuple[str, ...]:
+    def tried(self, scenario: SearchedScenario) -> tuple[str, ...]:
         """Return what to know of the checks of a bounded scenario.
 
         Raises:
@@ -438,15 +441,15 @@ class _Maker:
             raise ScenarioError(f"{self.where}: it asks {rules}, and no row of {_SAMPLE:,} does")
         return (f"{broken.mean():.0%} of random rows break what the ODD asks, and are refused",)
 
-    def _columns(self, scenario: LogicalScenario) -> dict[str, Float]:
+    def _columns(self, scenario: SearchedScenario) -> dict[str, Float]:
         space = scenario.space(self.axes[0])
         X = space.decode(np.random.default_rng(0).random((_SAMPLE, space.n_var)))
         return dict(zip(space.names, X.T, strict=True))
 
-    def _all_fit(self, scenario: LogicalScenario) -> bool:
+    def _all_fit(self, scenario: SearchedScenario) -> bool:
         return all(self._fits(scenario, axes) for axes in self.axes)
 
-    def _fits(self, scenario: LogicalScenario, axes: Any) -> bool:
+    def _fits(self, scenario: SearchedScenario, axes: Any) -> bool:
         try:
             scenario.space(axes)
         except ScenarioError:
