@@ -7,11 +7,13 @@ from typing import Literal, cast
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, StorageError
+from bridgegen.jobs.search.scenarios import within
 from bridgegen.openx.openscenario.exposure import distribution_xml, left_out
 from bridgegen.pages.exposure import refuse_other_page, write_page
 from bridgegen.scenario.exposure.fit import Fit, Progress, fit_exposure
 from bridgegen.scenario.exposure.reader import refuse_other_file, write_exposure
 from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.scenario import LogicalScenario
 
 _OTHERS = ("uniform", "default")
 REPLAY_DRIVERS = "reference,un-r157"
@@ -31,6 +33,7 @@ def write_fit(
     others: str | None = None,
     source: str | None = None,
     prior: str | None = None,
+    odd: Path | None = None,
     recordings: Sequence[Path] = (),
     road_map: Path | None = None,
     replay_drivers: str = REPLAY_DRIVERS,
@@ -54,6 +57,7 @@ def write_fit(
         others: likewise.
         source: likewise.
         prior: likewise.
+        odd: operational design domain within which events count: of the others none is fitted.
         recordings: files or folders; their events of this scenario are replayed beside their
             parameterised twins.
         road_map: of the recordings, see `bridgegen.recordings.twins.twins_of`.
@@ -78,7 +82,10 @@ def write_fit(
     refuse_other_page(page)
     if xosc is not None and xosc.exists():
         raise StorageError(f"{xosc}: exists already, and is not overwritten")
-    logical, drivers = load(scenario), replay_drivers.split(",")
+    logical, drivers = within(load(scenario), odd), replay_drivers.split(",")
+    assert isinstance(logical, LogicalScenario)
+    if odd is not None:
+        source = f"{source or ''} Inside the ODD {logical.odd.odd.name}.".strip()
     twins = None
     if recordings and replay_drivers != "none":
         if not out.parent.is_dir():  # minutes of replays must not be lost
