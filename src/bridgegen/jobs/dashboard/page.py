@@ -13,13 +13,12 @@ from bridgegen.base.disk import write_whole
 from bridgegen.jobs.dashboard.crash_types import TypeStanding
 from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
-from bridgegen.jobs.dashboard.odd import Coverage, Covered
+from bridgegen.jobs.dashboard.odd import SOURCE, Coverage, Covered
 from bridgegen.jobs.dashboard.of_odd import ProjectOdd
 from bridgegen.jobs.dashboard.requirements import Matrix, statements
 from bridgegen.jobs.dashboard.results import Result, versions
 from bridgegen.jobs.dashboard.results_of import SuiteLine
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
-from bridgegen.jobs.dashboard.taxonomy import SOURCE
 from bridgegen.jobs.dashboard.trends import Series
 from bridgegen.jobs.dashboard.verdicts import Standing, Step, Verdict, history, is_rare, standings
 from bridgegen.pages import charts, templates

@@ -62,12 +62,14 @@ class Table:
         concepts: by the names that files write, in lower case.
         units: by what they measure: the factor into the first.
         terms: of the ontology, by evidence: what states it.
+        attributes: of the standard, by group, each with its evidence and a note.
     """
 
     quantities: Mapping[str, Mapping[str, Any]]
     concepts: Mapping[str, Concept]
     units: Mapping[str, Mapping[str, float]]
     terms: Mapping[str, Sequence[str]]
+    attributes: Mapping[str, Mapping[str, str]]
 
 
 @cache
@@ -84,7 +86,7 @@ def table() -> Table:
             name, entry["at"], entry.get("quantity", ""), entry.get("bands") or {}, facts, types
         )
         concepts |= dict.fromkeys((name, *entry.get("also", ())), found)
-    return Table(data["quantities"], concepts, data["units"], data["terms"])
+    return Table(data["quantities"], concepts, data["units"], data["terms"], data["attributes"])
 
 
 def concept_of(name: str) -> Concept | None:
