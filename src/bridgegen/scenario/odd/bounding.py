@@ -36,6 +36,8 @@ Tree = "bool | Term | tuple[str, tuple[Tree, ...]]"
 class OddBound(Bound):
     """A bound that an ODD asks for, and reads as the ODD says it."""
 
+    SOURCE = "the operational design domain"
+
     def __str__(self) -> str:
         return self.why
 
@@ -257,6 +259,11 @@ def _met(clause: tuple[Term, ...], columns: Mapping[str, Any], n: int) -> Bool:
     return found
 
 
+def _span(parameter: Parameter) -> str:
+    ends = parameter.low, parameter.high
+    return parameter.kind.span_text(*ends, "{:.4g}".format, f" {parameter.unit}")
+
+
 class _Maker:
     """Brings clauses into a scenario, one after the other."""
 
@@ -354,34 +361,23 @@ class _Maker:
         if getattr(parameter, "distribution", None) is not None:
             return False  # a file gives how it is drawn, whatever its range
         ends = self._interval(name, clause)
-        span = parameter.kind.span_text(
-            parameter.low, parameter.high, "{:.4g}".format, f" {parameter.unit}"
-        )
         if ends is True:
             return True
         if ends is False:
             asked = " and ".join((*self.narrowed.get(name, ()), said))
-            declared = self.declared[name]
-            span = declared.kind.span_text(
-                declared.low, declared.high, "{:.4g}".format, f" {declared.unit}"
-            )
-            raise ScenarioError(f"{self.where}: it asks {asked}, {name} is {span}")
+            declared = _span(self.declared[name])
+            raise ScenarioError(f"{self.where}: it asks {asked}, {name} is {declared}")
         if ends is None:
             return False
         low, high = ends
-        changed = replace(
-            parameter,
-            low=low,
-            high=high,
-            default=float(np.clip(parameter.default, low, high)),
-        )
+        usual = float(np.clip(parameter.default, low, high))
+        changed = replace(parameter, low=low, high=high, default=usual)
         found = replace(self.scenario, parameters=self.scenario.parameters | {name: changed})
         if not self._all_fit(found):
             return False
         self.scenario = found
-        now = parameter.kind.span_text(low, high, "{:.4g}".format, f" {parameter.unit}")
         self.narrowed.setdefault(name, []).append(said)
-        self.changes.append(f"{said}: {name} is {now}, declared {span}")
+        self.changes.append(f"{said}: {name} is {_span(changed)}, declared {_span(parameter)}")
         return True
 
     def _bind(self, name: str, clause: tuple[Term, ...], said: str) -> bool:
@@ -405,7 +401,7 @@ class _Maker:
             else parse(f"{end!r} if {test.formula} else {limit!r}", "", categories, longest=LONG)
             for limit, end in zip(ends, (parameter.low, parameter.high), strict=True)
         ]
-        rule = OddBound(name, sides[0], sides[1], said, "the operational design domain")
+        rule = OddBound(name, *sides, said, OddBound.SOURCE)
         found = replace(self.scenario, bounds=(*self.scenario.bounds, rule))
         if not self._all_fit(found):
             return False
@@ -419,9 +415,7 @@ class _Maker:
         far = target.high + 2.0 * (1.0 + abs(target.high))
         text = f"{target.low!r} if {test.formula} else {far!r}"
         limit = parse(text, "", dict(test.formula.categories), longest=LONG, deepest=300)
-        self.checks.append(
-            OddBound(target.name, limit, None, said, "the operational design domain")
-        )
+        self.checks.append(OddBound(target.name, limit, None, said, OddBound.SOURCE))
         self.changes.append(f"{said}: rows that break it are refused")
 
     def tried(self, scenario: SearchedScenario) -> tuple[str, ...]:

@@ -52,6 +52,7 @@ from bridgegen.search.triage.record import (
     Drawn,
     Estimate,
     FreshRows,
+    Met,
     Minimal,
     Mode,
     Neighbourhood,
@@ -373,9 +374,10 @@ class _Triage:
     def _shares(self, groups: Sequence[Group]) -> tuple[Estimate, list[Estimate], FreshRows | None]:
         """Return the harmful share of the space, that of each mode, and the fresh rows drawn."""
         rows = self._rows
-        met = any(self._space.parameters[name].prior for name in self._space.variables)
-        within = met and _is_narrowed(self._pipeline)
-        drawn_of = partial(estimate, met=met, within=within)
+        met: Met = any(self._space.parameters[name].prior for name in self._space.variables)
+        if met and _is_narrowed(self._pipeline):
+            met = "within"
+        drawn_of = partial(estimate, met=met)
         fit = int(((rows.status == 0) & ~_implausible(rows)).sum())
         # Only rows that were drawn without regard to results estimate a share. Of a particle
         # swarm's leaves that are 80 to 100 % critical, 2 to 98 % of random scenarios are.
