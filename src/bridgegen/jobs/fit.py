@@ -7,13 +7,14 @@ from typing import Literal, cast
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, StorageError
-from bridgegen.jobs.search.scenarios import within
 from bridgegen.openx.openscenario.exposure import distribution_xml, left_out
 from bridgegen.pages.exposure import refuse_other_page, write_page
 from bridgegen.scenario.exposure.fit import Fit, Progress, fit_exposure
 from bridgegen.scenario.exposure.reader import refuse_other_file, write_exposure
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.odd.bounding import bounded
+from bridgegen.scenario.odd.reader import read_odd
 
 _OTHERS = ("uniform", "default")
 REPLAY_DRIVERS = "reference,un-r157"
@@ -82,10 +83,10 @@ def write_fit(
     refuse_other_page(page)
     if xosc is not None and xosc.exists():
         raise StorageError(f"{xosc}: exists already, and is not overwritten")
-    logical, drivers = within(load(scenario), odd), replay_drivers.split(",")
-    assert isinstance(logical, LogicalScenario)
+    logical, drivers = load(scenario), replay_drivers.split(",")
     if odd is not None:
-        source = f"{source or ''} Inside the ODD {logical.odd.odd.name}.".strip()
+        logical = cast(LogicalScenario, bounded(logical, domain := read_odd(odd)))
+        source = f"{source or ''} Inside the ODD {domain.name}.".strip()
     twins = None
     if recordings and replay_drivers != "none":
         if not out.parent.is_dir():  # minutes of replays must not be lost

@@ -8,6 +8,7 @@ scenario with clauses of its own, by the collisions that violate these.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
 from typing import Annotated, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from pydantic import Field
 from bridgegen.base.errors import InputError, ScenarioError
 from bridgegen.scenario.language.checks import try_out
 from bridgegen.scenario.language.parameters import Axis, Parameter, at, nearest
-from bridgegen.scenario.language.plain_yaml import Document
+from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
 from bridgegen.scenario.language.protocols import Clause, Collisions, Grid
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.schema_types import (
@@ -28,7 +29,6 @@ from bridgegen.scenario.language.schema_types import (
     section,
     shape_problems,
 )
-from bridgegen.scenario.typology import typologies
 
 Key = Annotated[str, Field(strict=True, pattern=f"^{ID}$")]
 Some = Annotated[list[NumberOrName], Field(min_length=1)]
@@ -197,17 +197,14 @@ def read_table(document: Document, exists: Callable[[str], bool]) -> PackTable:
 
 def _of_typology(name: str | None, document: Document) -> dict[str, RowSection]:
     """Return the types of a typology as rows; none without a name."""
-    if name is None:
-        return {}
-    if name not in typologies():
+    text = resources.files("bridgegen.scenario").joinpath("typology.yaml").read_bytes()
+    data: Any = read_plain_yaml(text, "typology.yaml").data
+    if name is not None and name not in data:
         where = at(document.at(("typology",)))
-        raise ScenarioError(f"there is no typology '{name}'{nearest(name, typologies())}{where}")
-    return {
-        kind.id: RowSection(
-            text=kind.name,
-            scenarios=[*kind.scenarios],
-            given=dict(kind.given),
-            lacks=None if kind.scenarios else "no scenario of the catalogue realises it",
-        )
-        for kind in typologies()[name].types
-    }
+        raise ScenarioError(f"there is no typology '{name}'{nearest(name, data)}{where}")
+    found = {}
+    for key, kind in data[name]["types"].items() if name else ():
+        scenarios, given = list(kind.get("scenarios", ())), kind.get("given", {})
+        lacks = None if scenarios else "no scenario of the catalogue realises it"
+        found[key] = RowSection(text=kind["name"], scenarios=scenarios, given=given, lacks=lacks)
+    return found

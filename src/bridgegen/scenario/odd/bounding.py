@@ -401,7 +401,7 @@ class _Maker:
             else parse(f"{end!r} if {test.formula} else {limit!r}", "", categories, longest=LONG)
             for limit, end in zip(ends, (parameter.low, parameter.high), strict=True)
         ]
-        rule = OddBound(name, *sides, said, OddBound.SOURCE)
+        rule = OddBound(name, sides[0], sides[1], said, OddBound.SOURCE)
         found = replace(self.scenario, bounds=(*self.scenario.bounds, rule))
         if not self._all_fit(found):
             return False
