@@ -181,6 +181,10 @@ def test_the_law_of_a_country_says_who_goes_first(keyed, tmp_path):
     labels = Findings.of(found["JP"], [""] * 60).rule
     assert labels[row] == "left before right"
     approve([summarise(found[key], row).sentence for key in ("US", "JP", "UK")], "left")
+    every = [summarise(found[key], i) for key in ("US", "UK") for i in range(60)]
+    cited = {each.rule_source for each in every if each} - {""}
+    assert len(cited) > 2
+    assert not [text for text in cited if "StVO" in text and not text.startswith("German law")]
     write_scenario(pipeline, X[row], tmp_path, "british")
     again = simulate_file(tmp_path / "british.xosc")
     assert again.rollout.country == "GB"

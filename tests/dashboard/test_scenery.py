@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.jobs.dashboard.odd import coverage
-from bridgegen.jobs.dashboard.scenery import scenery_of
-from bridgegen.jobs.dashboard.taxonomy import QUANTITIES, TAXONOMY
+from bridgegen.jobs.dashboard.odd import TAXONOMY, coverage
+from bridgegen.jobs.dashboard.scenery import BANDS, scenery_of
 from bridgegen.jobs.search.scenarios import load
 from bridgegen.scenario.language.reader import names
 from bridgegen.scenario.weather import PARAMETERS
@@ -116,7 +115,7 @@ def test_the_top_level_is_that_of_iso_34503():
 
 def test_every_band_of_a_quantity_is_an_attribute():
     named = {one.band for one in TAXONOMY if one.band}
-    assert named == {(name, k) for name, of in QUANTITIES.items() for k in range(len(of.upper))} - {
+    assert named == {(name, k) for name, of in BANDS.items() for k in range(len(of))} - {
         ("rain", 4)  # no scenario rains more than 50 mm/h
     }
 

@@ -244,6 +244,20 @@ def test_the_command_writes_exposure_page_and_distribution(tmp_path, events, mon
     assert (status, "is not overwritten" in err) == (2, True)
 
 
+def test_inside_an_odd_the_events_outside_are_left_out(tmp_path, events, monkeypatch, capsys):
+    table = _csv(tmp_path / "events.csv", events, count=200)
+    (tmp_path / "slow.yaml").write_text(
+        "ODD:\n  m:\n    INCLUDE_AND:\n      operational_speed: '<= 100 km/h'\n", "utf-8"
+    )
+    status, out, err = _run(
+        monkeypatch, capsys, "fit", "cut-in", table, "--others", "default", "--replicates", "20",
+        "--odd", tmp_path / "slow.yaml", "--out", tmp_path / "e.yaml", "--json",
+    )  # fmt: skip
+    assert status == 0, err
+    assert json.loads(out)["used"] == int((events["ego_speed"][:200] <= 100 / 3.6).sum())
+    assert "Inside the ODD slow." in (tmp_path / "e.yaml").read_text("utf-8")
+
+
 def test_the_distribution_is_read_as_the_fit(tmp_path, events, monkeypatch, capsys):
     table = _csv(tmp_path / "events.csv", events, count=200)
     _run(

@@ -9,14 +9,17 @@ import pytest
 from tests.approval import approve, refuses
 
 import bridgegen as bg
-from bridgegen.base.errors import InputError, ScenarioError, UnsupportedError
+from bridgegen.base.errors import InputError, ScenarioError
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.jobs.dashboard.dashboard import build_dashboard
 from bridgegen.jobs.preventability.preventability import map_preventability
 from bridgegen.jobs.risk.risk import estimate_risk
 from bridgegen.jobs.search.campaign import resume
+from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.jobs.search.scenarios import load, within
 from bridgegen.jobs.suite.suite import run_suite
 from bridgegen.results.store import Store
+from bridgegen.scenario.odd.states import states_of
 
 HERE = Path(__file__).parent
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/motorway-odd.yaml"
@@ -44,6 +47,11 @@ def test_a_search_stays_inside_and_records_the_odd_with_its_contents(folder):
     assert sorted(recorded["files"]) == ["my_odd.yaml", "taxonomy.yaml"]
     assert f"--odd {folder / 'my_odd.yaml'}" in run.settings.command(folder)
     assert "ODD my_odd, 2 conditions not judged" in run.report.read_text(encoding="utf-8")
+
+
+def test_what_is_said_of_the_weather_names_that_it_is_drawn_from_a_part(folder, cli):
+    said = "weather as it is met within its ranges, all else uniform"
+    assert bg.Run(folder / "run").triage.bound.space.measure == said
 
 
 def test_what_it_exports_has_its_current_operational_domain(folder):
@@ -97,17 +105,26 @@ def test_the_dashboard_shows_the_projects_odd_and_counts_other_runs_against_it(f
     assert other.others == {"my_odd"}
 
 
-def test_a_suite_does_not_run_what_is_outside(tmp_path):
+def test_a_suite_does_not_run_what_is_outside_and_counts_in_the_dashboard(tmp_path):
+    run_suite("cut-in", samples=20, out=tmp_path / "free")
     suite = run_suite(["cut-in", "lead-brakes"], samples=1, odd=EXAMPLE, out=tmp_path / "suite")
     problems = {result.entry: result.problem for result in suite.results}
     assert problems["cut-in"] == ""
     assert "excludes every row of lead-brakes" in problems["lead-brakes"]
+    odd = build_dashboard(tmp_path).project.odd
+    assert (odd.coverage.odd.name, odd.entries, odd.unread) == ("motorway-odd", 2, 0)
+    assert odd.coverage.evaluations + odd.outside == 21 + 2  # each with the defaults
+    assert 0 < odd.outside < 21
+    assert "0 runs and 2 entries of suites" in (tmp_path / "dashboard.html").read_text("utf-8")
 
 
 def test_a_suites_variations_are_run_again_in_its_odd(tmp_path, cli):
     key, out, suite = str(tmp_path / "key"), str(tmp_path / "out"), ["suite"]
-    assert cli(*suite, "commit", "cut-in", "--key", key, "--number", "10")[0] == 0
-    words = ["cut-in", "--ego", "route-follower", "--odd", str(EXAMPLE), "--out", out]
+    given = ["--odd", str(EXAMPLE)]
+    assert cli(*suite, "commit", "cut-in", "--key", key, "--number", "10", *given)[0] == 0
+    code, _, err = cli(*suite, "cut-in", "--assessor", key)
+    assert (code, "as the key says; not: odd" in err) == (2, True), err
+    words = ["cut-in", "--ego", "route-follower", *given, "--out", out]
     cli(*suite, *words, "--assessor", key)
     code, said, err = cli(*suite, "verify", f"{out}/sealed.json", "cut-in", "--ego=route-follower")
     assert (code, "to the bit" in said) == (0, True), err
@@ -132,12 +149,36 @@ def test_a_run_file_names_the_odd_and_is_read_again(tmp_path, cli):
     assert first == second
 
 
-def test_a_scenario_file_and_a_scenario_outside_are_refused(tmp_path):
+def test_a_scenario_outside_is_refused():
     with refuses(ScenarioError, "roundabout-entry"):
         within(load("roundabout-entry"), EXAMPLE)
-    run = bg.run_search("cut-in", ego="route-follower", budget=4, keep=1, out=tmp_path / "run")
-    with refuses(UnsupportedError, "0001"):
-        within(load(run.scenarios[0]), EXAMPLE)
+
+
+def test_a_scenario_file_is_bounded_by_its_weather_speed_and_participants(tmp_path):
+    """As the scenario is that it was written of; its map is not read."""
+    pipeline = Pipeline(logical := load("cut-in"), logical.space())
+    row = pipeline.space.row({"fog_density": 60.0, "precipitation": 20.0, "wind_intensity": 30.0})
+    write_scenario(pipeline, row, tmp_path, "exported")
+    file = load(tmp_path / "exported.xosc")
+    found, states = file.states(), states_of(logical)
+    for name, formula in found.quantities.items():
+        expected = states.quantities[name].evaluate(pipeline.space.values(row))
+        assert float(formula.evaluate(file.usual_values())) == pytest.approx(
+            expected, abs=0.51 * (name == "cloud")
+        )
+    assert {*found.quantities} == {
+        "rain", "visual_range", "wind", "friction", "sun_altitude", "illuminance", "cloud",
+        "ego_speed",
+    }  # fmt: skip
+    assert found.others == ((("car",), ""),)
+    text = "ODD:\n  m:\n    INCLUDE_AND:\n      visibility: '{} 420 m'\n      lane_width: '> 9 m'\n"
+    for sign in ("<", ">"):
+        (tmp_path / f"{sign}.yaml").write_text(text.format(sign))
+    assert within(file, tmp_path / "<.yaml").odd.gaps == {
+        "lane_width > 9 m": "not read of an OpenSCENARIO file"
+    }
+    with refuses(ScenarioError, "visibility > 420 m"):
+        within(file, tmp_path / ">.yaml")
 
 
 def test_a_risk_inside_states_no_rate_of_all_encounters(tmp_path, cli):

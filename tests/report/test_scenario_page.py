@@ -175,6 +175,12 @@ def test_a_negative_offset_is_to_the_right():
     approve(lines[4], "1.5 m")
 
 
+def test_the_main_road_of_a_merge_has_no_oncoming_side():
+    said = " ".join(story_lines(load("merge-reactions")))
+    assert "starts at ego_start on lane 2 of leg main in at ego_speed" in said
+    assert "oncoming" not in said
+
+
 def test_an_emergency_vehicle_on_a_call_in_words():
     (line,) = [one for one in story_lines(load("emergency-vehicle-on-red")) if "siren" in one]
     approve(line, "ambulance_start", "lane 2", "allowed")

@@ -124,6 +124,10 @@ def test_the_page_says_it_without_scripts(risk):
     assert "<script" not in without_theme(page)
     assert not re.search(r"(src|href)=.https?:", page)
     assert page.count("<figure>") == len(risk.exposure.marginals)
+    (crash,) = said(risk.folder)["crash_types"]
+    assert (crash["percent"], crash["country"], crash["year"]) == (4.44, "US", 2004)
+    assert f"{crash['type']} is the type of 4.4 % of crashes" in page
+    assert "DOT HS 810 767" in page
 
 
 def test_the_most_likely_harm_is_seen_first_on_its_road_with_its_sentence(risk):

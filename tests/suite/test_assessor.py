@@ -193,6 +193,9 @@ def test_the_whole_way_on_the_command_line(home, monkeypatch, capsys):
     approve(capsys.readouterr().out, "published", "variations", "run again")
     again = replay(Path("suites/one"), "cut-in", critical[0])  # as in any suite
     assert again.is_same
+    # A re-test is judged as a suite is.
+    assert call(monkeypatch, f"{words}+stop-in-lane") == 3
+    assert "re-test" in capsys.readouterr().out
 
 
 def test_a_suite_without_a_key_records_what_it_did_before(home):
@@ -248,6 +251,10 @@ def test_what_is_wrong_with_a_key_is_one_error(home):
         evaluate_suite(["cut-in", "lead-brakes"], assessor=Path("a.key"))
     with refuses(InputError, "--samples"):
         assess(samples=5)
+    with refuses(InputError, "critical"):
+        assess(critical="thresholds")
+    with refuses(InputError, "criteria"):
+        assess(criteria=[{"id": "R-1", "formula": "always(gap to bv > 2 m)"}])
     with refuses(InputError, "--number"):
         commit(Path("c.key"), ["cut-in"], 3)
     with pytest.raises(InputError):  # and none of them spends the key
@@ -303,7 +310,8 @@ def test_a_mended_driver_is_tested_again(home):
     )
     failures = suite.sealed.failures
     assert failures
-    lines = verify(suite.folder / SEALED, ["cut-in"], (), [f"{PLANTED}:careful"])
+    lines, fails = verify(suite.folder / SEALED, ["cut-in"], (), [f"{PLANTED}:careful"])
+    assert not fails
     (head,) = [line for line in lines if line.startswith("re-test")]
     approve(head, "fixes")
     assert sum(", fixed: " in line and failures[0].title in line for line in lines)

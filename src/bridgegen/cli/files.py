@@ -465,6 +465,7 @@ def fit(
             "uniform, an example's name, or a file."
         ),
     ] = None,
+    odd: options.Odd = None,
     recordings: Annotated[
         list[Path] | None,
         typer.Option(
@@ -495,7 +496,7 @@ def fit(
         fitted, written = write_fit(
             scenario, events, out=out, page=page, xosc=xosc, hours=hours, km=km,
             ignore=ignore or (), others=without_column, source=source, prior=prior,
-            recordings=recordings or (), road_map=road_map, replay_drivers=replay_drivers,
+            odd=odd, recordings=recordings or (), road_map=road_map, replay_drivers=replay_drivers,
             replicates=replicates, seed=seed, progress=live.progress, replayed=live.replayed,
             notes=notes,
         )  # fmt: skip

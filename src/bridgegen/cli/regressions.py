@@ -15,6 +15,8 @@ from bridgegen.cli.connection import (
     with_connection_options,
     with_map_folder,
 )
+from bridgegen.cli.declared import declaration
+from bridgegen.engine.options.forms import CRITERIA
 from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, WHAT
 
 Results = Annotated[
@@ -131,15 +133,25 @@ def commit(
     number: Annotated[
         int, typer.Option(help="Variations of each scenario.", rich_help_panel=SEARCH)
     ] = 200,
+    odd: common.Odd = None,
+    criterion: Annotated[list[str] | None, declaration("criteria")] = None,
+    critical: common.Critical = None,
+    count: Annotated[str | None, declaration("count")] = None,
+    others: common.Others = None,
+    empty_trigger: common.EmptyTrigger = None,
 ) -> None:
     """Make an assessor's key, and print the hash to publish.
 
     Publish it before the driver is handed in. 'suite ... --assessor KEY' draws the variations of
-    that key, once, and seals the result.
+    that key, once, and seals the result. What bounds and judges them is given here and there.
     """
     from bridgegen.jobs.suite.sealed import commit as lines_of
 
-    print("\n".join(lines_of(key, files, number)))
+    judged = {
+        "odd": odd, "criteria": CRITERIA.read(criterion or [], "--criterion"),
+        "critical": critical, "count": count, "others": others, "empty_trigger": empty_trigger,
+    }  # fmt: skip
+    print("\n".join(lines_of(key, files, number, **judged)))
 
 
 @suites.command("verify")
@@ -160,7 +172,13 @@ def verify(
         ),
     ] = None,
 ) -> None:
-    """Verify a sealed result; with --ego, run it again."""
-    from bridgegen.jobs.suite.sealed import verify as lines_of
+    """Verify a sealed result; with --ego, run it again.
 
-    print("\n".join(lines_of(sealed, files, published or (), ego or ())))
+    The exit status is 3 if a variation of a re-test fails or did not run.
+    """
+    from bridgegen.jobs.suite.sealed import verify as verified
+
+    lines, fails = verified(sealed, files, published or (), ego or ())
+    print("\n".join(lines))
+    if fails:
+        raise typer.Exit(FAILED)

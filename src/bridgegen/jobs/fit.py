@@ -12,6 +12,9 @@ from bridgegen.pages.exposure import refuse_other_page, write_page
 from bridgegen.scenario.exposure.fit import Fit, Progress, fit_exposure
 from bridgegen.scenario.exposure.reader import refuse_other_file, write_exposure
 from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.odd.bounding import bounded
+from bridgegen.scenario.odd.reader import read_odd
 
 _OTHERS = ("uniform", "default")
 REPLAY_DRIVERS = "reference,un-r157"
@@ -31,6 +34,7 @@ def write_fit(
     others: str | None = None,
     source: str | None = None,
     prior: str | None = None,
+    odd: Path | None = None,
     recordings: Sequence[Path] = (),
     road_map: Path | None = None,
     replay_drivers: str = REPLAY_DRIVERS,
@@ -54,6 +58,7 @@ def write_fit(
         others: likewise.
         source: likewise.
         prior: likewise.
+        odd: operational design domain within which events count: of the others none is fitted.
         recordings: files or folders; their events of this scenario are replayed beside their
             parameterised twins.
         road_map: of the recordings, see `bridgegen.recordings.twins.twins_of`.
@@ -79,6 +84,9 @@ def write_fit(
     if xosc is not None and xosc.exists():
         raise StorageError(f"{xosc}: exists already, and is not overwritten")
     logical, drivers = load(scenario), replay_drivers.split(",")
+    if odd is not None:
+        logical = cast(LogicalScenario, bounded(logical, domain := read_odd(odd)))
+        source = f"{source or ''} Inside the ODD {domain.name}.".strip()
     twins = None
     if recordings and replay_drivers != "none":
         if not out.parent.is_dir():  # minutes of replays must not be lost

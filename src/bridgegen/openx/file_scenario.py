@@ -5,7 +5,9 @@ other values of its parameters, on the same map.
 """
 
 import hashlib
+import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,7 +24,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters, validate
 from bridgegen.openx.openscenario.bodies import kind_of
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
-from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.element import Element, walk
 from bridgegen.openx.openscenario.fixed_texts import fixed_texts
 from bridgegen.openx.openscenario.parameters import EGO, ego_of, rename_entity
 from bridgegen.openx.openscenario.pruning import read_empty_triggers
@@ -34,14 +36,30 @@ from bridgegen.openx.openscenario.values import Kind, format_double
 from bridgegen.openx.prepared import logic_path, prepared
 from bridgegen.openx.xml import read_bytes
 from bridgegen.scenario.language.constraints import Constraints
+from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.objectives import HARM
 from bridgegen.scenario.language.parameters import Axis, Bound
 from bridgegen.scenario.language.scenario import SearchedScenario, content_of
 from bridgegen.scenario.language.space import SearchSpace
+from bridgegen.scenario.odd.states import LONG, States, facts_of_types
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.site import Site
 
 MAX_SEED = 2**32 - 1
+
+_STATED: Mapping[type[Element], tuple[tuple[str, str, str], ...]] = {
+    osc.Fog: (("visual_range", "{}", "visual_range"),),
+    osc.Precipitation: (("rain", "{}", "precipitation_intensity"),),
+    osc.RoadCondition: (("friction", "0.85*{}", "friction_scale_factor"),),
+    osc.Sun: (
+        ("sun_altitude", "{}*180/pi", "elevation"),
+        ("illuminance", "100000*max(sin({}), 0)", "elevation"),
+    ),
+    osc.Weather: (("cloud", "{}", "fractional_cloud_cover"),),
+    osc.Wind: (("wind", "{}", "speed"),),
+    osc.AbsoluteTargetSpeed: (("ego_speed", "3.6*{}", "value"),),
+}
+"""Quantities of ODDs (``taxonomy.yaml``) that an element states, their formulas, its attributes."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +119,56 @@ class FileScenario(SearchedScenario):
         more = repr((self.texts, self.variant_names, self.variants)) if self.variants else ""
         return hashlib.sha256((content + more).encode()).hexdigest()
 
+    def states(self) -> States:
+        """Return what the file states of an ODD at the start: weather, the ego's speed, types.
+
+        Of its map it says nothing, which may have other roads elsewhere.
+        """
+        ego, others = ego_of(self.storyboard), []
+        for obj in self.storyboard.entities.scenario_objects:
+            kind = kind_of(obj.entity_object) if str(obj.name) != ego else None
+            if kind is not None and kind.takes_part:
+                others.append(((kind.name,), ""))
+        start = self.storyboard.storyboard.init.actions
+        own = [each for each in start.privates if str(each.entity_ref) == ego]
+        varies = {*self.parameters, *(each.name for each in self.derived), *self.texts}
+        fixed = {k: v for k, v in parameters.values(self.storyboard).items() if k not in varies}
+        quantities = dict[str, Expression]()
+        for element in (each for part in (*start.global_actions, *own) for each in walk(part)):
+            for name, formula, attribute in _STATED.get(type(element), ()):
+                value = getattr(element, attribute)
+                if isinstance(value, osc.ParameterRef):
+                    value = fixed.get(value.name, f"({value.name})")
+                if value in OKTAS:
+                    value = min(OKTAS.index(value), 8)
+                elif isinstance(value, osc.Expr):
+                    value = _WORD.sub(
+                        lambda word: str(fixed.get(word[0], word[0])),
+                        f"({value.expression.source})",
+                    )
+                with suppress(InputError):  # a name that no formula may have
+                    found = None if value is None else parse(formula.format(value), longest=LONG)
+                    if found and found.names <= varies and not _is_partial(element):
+                        quantities[name] = found
+        facts, unread = facts_of_types(others), "not read of an OpenSCENARIO file"
+        return States(self, frozenset(facts), quantities, tuple(others), True, unread)
+
     def variant(self, values: Mapping[str, float]) -> Variant:
         """Return the scenario file with the texts that a row has."""
         if not self.variants:
             return Variant(self.storyboard, self.roads)
         return self.variants[tuple(values[name] for name in self.variant_names)]
+
+
+OKTAS = [*osc.FractionalCloudCover]
+_WORD = re.compile(r"[A-Za-z_]\w*")
+
+
+def _is_partial(element: Element) -> bool:
+    """Return whether an element states a quantity in part only: snow is no rain, a bank no fog."""
+    if isinstance(element, osc.Precipitation):
+        return element.precipitation_type not in ("rain", "dry")
+    return isinstance(element, osc.Fog) and element.bounding_box is not None
 
 
 def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScenario:

@@ -3,6 +3,7 @@
 import shlex
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from markupsafe import Markup
@@ -25,6 +26,7 @@ from bridgegen.pages.sketch import sketch
 from bridgegen.scenario.countries import in_the_mirror
 from bridgegen.scenario.language.parameters import Parameter
 from bridgegen.scenario.language.reader import load as load_scenario
+from bridgegen.scenario.language.roads import RoadsSpec
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.story import (
     CONDITIONS,
@@ -59,7 +61,7 @@ def _lines(scenario: LogicalScenario) -> Iterator[str]:
         if participant.name not in jammed:
             yield _participant(participant, scenario)
     yield from (_jam(jam, scenario) for jam in scenario.story.jams)
-    yield from (_works(works) for works in scenario.story.works)
+    yield from (_works(works, scenario) for works in scenario.story.works)
     yield from (_ghost(ghost) for ghost in scenario.story.ghosts)
     yield from (_event(event) for event in scenario.events)
 
@@ -77,8 +79,9 @@ def _participant(participant: Participant, scenario: LogicalScenario) -> str:
         extra += f", faster than allowed if need be ({participant.exceeds_limit})"
     if participant.off_crosswalk:
         extra += f", away from crosswalks ({participant.off_crosswalk})"
+    place = partial(_place, scenario.roads)
     if participant.path:
-        start, *between, end = map(_place, participant.path)
+        start, *between, end = map(place, participant.path)
         past, how = (
             ("past", ", a smooth curve,") if participant.conduct == "vehicle" else ("via", "")
         )
@@ -88,7 +91,7 @@ def _participant(participant: Participant, scenario: LogicalScenario) -> str:
     if participant.ways:
         names = scenario.parameters[participant.place_by].kind.names
         at = [
-            f"from {_place(start)}{f' to {_place(end)}' if end else ''} ({name})"
+            f"from {place(start)}{f' to {place(end)}' if end else ''} ({name})"
             for name, (start, end) in zip(names, participant.ways, strict=True)
         ]
         return (
@@ -101,12 +104,12 @@ def _participant(participant: Participant, scenario: LogicalScenario) -> str:
     elif participant.heading != 0.0:
         turned = f", turned by {in_words(participant.heading, 'deg')}"
     if participant.conduct == "obstacle" or (participant.speed == 0.0 and participant.end is None):
-        return f"{who}, stands at {_place(participant.start)}{turned}{extra}."
-    goes = "" if participant.end is None else f" and goes to {_place(participant.end)}"
+        return f"{who}, stands at {place(participant.start)}{turned}{extra}."
+    goes = "" if participant.end is None else f" and goes to {place(participant.end)}"
     if participant.change:
-        begin, by = map(_place, participant.change)
+        begin, by = map(place, participant.change)
         goes += f", changing lanes between {begin} and {by}"
-    return f"{who}, starts at {_place(participant.start)} at {speed}{turned}{extra}{goes}."
+    return f"{who}, starts at {place(participant.start)} at {speed}{turned}{extra}{goes}."
 
 
 def _kind(participant: Participant) -> str:
@@ -124,13 +127,13 @@ def _noun(name: str) -> str:
 
 def _jam(jam: Jam, scenario: LogicalScenario) -> str:
     kinds = ", ".join(scenario.participant(name).type for name in jam.participants)
-    return f"{jam.name}, a queue from its tail at {_place(jam.tail)}: {kinds}."
+    return f"{jam.name}, a queue from its tail at {_place(scenario.roads, jam.tail)}: {kinds}."
 
 
-def _works(works: RoadWorks) -> str:
+def _works(works: RoadWorks, scenario: LogicalScenario) -> str:
     return (
         f"{works.name}: {len(works.cones)} cones close {works.length:g} m from "
-        f"{_place(works.start)} on, announced by a sign."
+        f"{_place(scenario.roads, works.start)} on, announced by a sign."
     )
 
 
@@ -159,10 +162,10 @@ def _condition(condition_spec: ConditionSpec, event: EventSpec) -> str:
     return f"{subject} is {kind.rule} {in_words(condition_spec.value, kind.unit)}"
 
 
-def _place(at: Waypoint) -> str:
+def _place(roads: RoadsSpec, at: Waypoint) -> str:
     lane = f"lane {at.lane}" if isinstance(at.lane, int) else f"the {at.lane}"
     where = f" of leg {at.leg} {at.way}"
-    if at.leg == "main":
+    if roads.template == "road":
         where = "" if at.way == "out" else " of the oncoming side"
     aside = "" if at.offset == 0.0 else f", {beside(at.offset)} of its centre"
     return f"{in_words(at.distance, 'm')} on {lane}{where}{aside}"

@@ -101,6 +101,23 @@ def shares(types: Sequence[CrashType]) -> str:
     return f", with {' and '.join(words)}" if words else ""
 
 
+def published(scenario: str) -> list[dict[str, Any]]:
+    """Return the types of crashes that a scenario of the catalogue realises, with known shares."""
+    return [
+        {
+            "type": kind.name,
+            "percent": kind.percent,
+            "of": typology.counts,
+            "country": typology.country,
+            "year": typology.year,
+            "source": typology.source,
+        }
+        for typology in typologies().values()
+        for kind in typology.types
+        if scenario in kind.scenarios and kind.percent is not None
+    ]
+
+
 def said(typology: Typology) -> str:
     """Return in words how much of a typology scenarios cover, and what is not known."""
     missing = [what for name, what in _QUANTITIES.items() if total_of(typology.types, name) is None]

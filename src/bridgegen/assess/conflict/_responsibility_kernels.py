@@ -574,6 +574,9 @@ def of_striking(scene, e, k, risk, early, since, side, late, stands, avoidable, 
         whole[DECIDED], whole[PREVENTABLE] = begins, could
         if could:
             return EGO, CUT_IN_PREVENTABLE
+        # 5.2.5.2 is of changes of lane: nobody must expect one that turns into the way at red.
+        if claim != -SIREN and ran_red(scene, e, k, k) >= 0:
+            return OTHER, RED_LIGHT
         # 5.2.5.2 asks more of a system than Annex 3's model of a human does: all 43 contacts that
         # an outside reading found excused were above its limit. It asks that a collision is
         # avoided, so near misses stay excused.

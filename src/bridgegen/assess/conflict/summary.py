@@ -399,11 +399,16 @@ _SAID = ("sentence", "avoidance", "rule", "rule_says", "zone_ego", "zone_other")
 
 def _by_law(found: ConflictSummary, rule: Rule, conflicts: Conflicts) -> ConflictSummary:
     """Return a conflict on the side on which it happened, with the law of its country."""
-    country = country_of(conflicts.country)
-    law = country.source if country else f"as in a mirror: {found.rule_source}"
-    if rule in _BY_SIDE and (country or conflicts.left_hand):
-        sentence = found.sentence.replace(f"({found.rule_source})", f"({law})")
-        found = replace(found, rule_source=law, sentence=sentence)
+    country, law = country_of(conflicts.country), found.rule_source
+    if rule in _BY_SIDE and country:
+        law = country.source
+    elif rule in _BY_SIDE and conflicts.left_hand:
+        law = f"as in a mirror: {law}"
+    elif law and country and country.code != "DE":
+        others = [text for text in law.split("; ") if not text.startswith("StVO")]
+        law = "; ".join(others) or f"German law, that of {country.code} was not read: {law}"
+    sentence = found.sentence.replace(f"({found.rule_source})", f"({law})")
+    found = replace(found, rule_source=law, sentence=sentence)
     if not conflicts.left_hand:
         return found
     texts: dict[str, Any] = {name: in_the_mirror(getattr(found, name)) for name in _SAID}

@@ -161,11 +161,6 @@ class Rule(IntEnum):
         """Its label in texts and files; empty for NONE."""
         return self.name.lower().replace("_", " ") if self else ""
 
-    @property
-    def source(self) -> str:
-        """The source of the rule."""
-        return RULES[self][1]
-
 
 RULES = {
     Rule.NONE: ("", ""),

@@ -5,7 +5,48 @@ from dataclasses import dataclass
 
 from bridgegen.jobs.dashboard.results import Result, Seen
 from bridgegen.jobs.dashboard.scenery import Scenery
-from bridgegen.jobs.dashboard.taxonomy import TAXONOMY, Attribute
+from bridgegen.scenario.odd.states import table
+
+SOURCE = "ISO 34503:2023, BSI PAS 1883:2020"
+
+
+@dataclass(frozen=True)
+class Attribute:
+    """A leaf of the taxonomy.
+
+    Attributes:
+        path: from the top to its name.
+        fact: of scenarios that have it; "" for none.
+        band: a quantity, and the number of its band; None for none.
+        note: what a reader has to know of it.
+    """
+
+    path: tuple[str, ...]
+    fact: str = ""
+    band: tuple[str, int] | None = None
+    note: str = ""
+
+    @property
+    def expressible(self) -> bool:
+        """Whether a scenario can state it."""
+        return bool(self.fact) or self.band is not None
+
+
+def _read(group: str, name: str, text: str) -> Attribute:
+    evidence, _, note = (part.strip() for part in text.partition("#"))
+    quantity, _, number = evidence.rpartition(":")
+    path = (*group.split(" / "), name)
+    if quantity in table().quantities:
+        return Attribute(path, band=(quantity, int(number)), note=note)
+    return Attribute(path, fact=evidence, note=note)
+
+
+TAXONOMY = tuple(
+    _read(group, name, text)
+    for group, names in table().attributes.items()
+    for name, text in names.items()
+)
+"""All attributes of ``taxonomy.yaml``, in its order."""
 
 
 @dataclass(frozen=True)

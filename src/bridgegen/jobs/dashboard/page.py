@@ -13,13 +13,12 @@ from bridgegen.base.disk import write_whole
 from bridgegen.jobs.dashboard.crash_types import TypeStanding
 from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
-from bridgegen.jobs.dashboard.odd import Coverage, Covered
+from bridgegen.jobs.dashboard.odd import SOURCE, Coverage, Covered
 from bridgegen.jobs.dashboard.of_odd import ProjectOdd
 from bridgegen.jobs.dashboard.requirements import Matrix, statements
 from bridgegen.jobs.dashboard.results import Result, versions
 from bridgegen.jobs.dashboard.results_of import SuiteLine
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
-from bridgegen.jobs.dashboard.taxonomy import SOURCE
 from bridgegen.jobs.dashboard.trends import Series
 from bridgegen.jobs.dashboard.verdicts import Standing, Step, Verdict, history, is_rare, standings
 from bridgegen.pages import charts, templates
@@ -552,13 +551,15 @@ def _of_odd(odd: ProjectOdd) -> dict[str, Any] | None:
     found = odd.coverage
     if found is None:
         return None
+    entries = counted(odd.entries, "entry of suites", "entries of suites")
     words = [
-        f"{counted(odd.runs, 'run')}: {counted(found.evaluations, 'evaluation')} inside, of which "
+        f"{counted(odd.runs, 'run')}{f' and {entries}' if odd.entries else ''}: "
+        f"{counted(found.evaluations, 'evaluation')} inside, of which "
         f"{found.failures:,} fail; {odd.outside:,} outside",
         found.pairs_in_words,
     ]
-    words += [f"not read of {counted(odd.unread, 'run')}"] if odd.unread else []
-    words += [f"other ODDs bound runs, too: {joined(sorted(odd.others))}"] if odd.others else []
+    words += [f"not read of {counted(odd.unread, 'result')}"] if odd.unread else []
+    words += [f"other ODDs bound results, too: {joined(sorted(odd.others))}"] if odd.others else []
     rows = [
         [
             each.name,
@@ -570,16 +571,10 @@ def _of_odd(odd: ProjectOdd) -> dict[str, Any] | None:
         ]
         for each in found.attributes
     ]
-    heads = (
-        "attribute",
-        "inside",
-        "searched",
-        "evaluations by value",
-        "limits tried",
-        "never tried",
-    )
+    heads = "attribute, inside, searched, evaluations by value, limits tried, never tried"
     title = f"{found.odd.title} ({found.odd.name})"
-    return {"title": title, "words": "; ".join(words) + ".", "table": _table(title, heads, rows)}
+    table = _table(title, heads.split(", "), rows)
+    return {"title": title, "words": "; ".join(words) + ".", "table": table}
 
 
 def _asks(each: OddAttribute) -> str:
@@ -685,78 +680,33 @@ def _results(found: Dashboard, base: str) -> Iterator[Table]:
     runs = sorted(project.runs, key=lambda run: (-run.time, run.source))
     suites = sorted(project.suites, key=lambda suite: (-suite.time, suite.source))
     compared = [suite for suite in suites if suite.difference]
-    for title, heads, rows in (
-        (
-            counted(len(runs), "run"),
-            (
-                "run",
-                "scenario",
-                "driver",
-                "evaluations",
-                "harmful",
-                "of the space",
-                "changed (UTC)",
-            ),
-            [_run(run, base) for run in runs],
-        ),
-        (
-            counted(len(suites), "suite"),
-            (
-                "suite",
-                "drivers",
-                "scenarios",
-                "not judged",
-                "variations",
-                "fail",
-                "not run",
-                "changed (UTC)",
-            ),
-            [_suite(suite, base) for suite in suites],
-        ),
-        (
-            counted(len(compared), "difference of two drivers", "differences of two drivers"),
-            (
-                "suite",
-                "first driver",
-                "second driver",
-                "only the first fails",
-                "only the second fails",
-                "both fail",
-                "both pass",
-                "by chance",
-            ),
-            [_difference(line, base) for line in compared],
-        ),
-        (
-            counted(len(project.maps), "preventability map"),
-            (
-                "map",
-                "scenario",
-                "driver",
-                "cells",
-                "avoided",
-                "not avoided though preventable",
-                "not preventable",
-            ),
-            [*_maps(found, base)],
-        ),
-        (
-            counted(
-                len(project.comparisons), "comparison of algorithms", "comparisons of algorithms"
-            ),
-            ("comparison", "scenarios", "algorithms", "runs"),
-            [
-                [
-                    Cell(comparison.source, href=_address(base, comparison.page)),
-                    joined(comparison.scenarios),
-                    joined(comparison.algorithms),
-                    comparison.runs,
-                ]
-                for comparison in project.comparisons
-            ],
-        ),
-    ):
-        yield _table(title, heads, rows)
+    heads = "run, scenario, driver, evaluations, harmful, of the space, changed (UTC)"
+    yield _of(runs, ("run",), heads, (_run(run, base) for run in runs))
+    heads = "suite, drivers, scenarios, not judged, variations, fail, not run, changed (UTC)"
+    yield _of(suites, ("suite",), heads, (_suite(suite, base) for suite in suites))
+    heads = (
+        "suite, first driver, second driver, only the first fails, only the second fails, "
+        "both fail, both pass, by chance"
+    )
+    names = ("difference of two drivers", "differences of two drivers")
+    yield _of(compared, names, heads, (_difference(line, base) for line in compared))
+    heads = "map, scenario, driver, cells, avoided, not avoided though preventable, not preventable"
+    yield _of(project.maps, ("preventability map",), heads, _maps(found, base))
+    names = ("comparison of algorithms", "comparisons of algorithms")
+    lines: Iterator[Row] = (
+        [
+            Cell(comparison.source, href=_address(base, comparison.page)),
+            joined(comparison.scenarios),
+            joined(comparison.algorithms),
+            comparison.runs,
+        ]
+        for comparison in project.comparisons
+    )
+    yield _of(project.comparisons, names, "comparison, scenarios, algorithms, runs", lines)
+
+
+def _of(some: Sequence[object], noun: Sequence[str], heads: str, rows: Iterable[Row]) -> Table:
+    return _table(counted(len(some), *noun), heads.split(", "), [*rows])
 
 
 def _run(result: Result, base: str) -> Row:

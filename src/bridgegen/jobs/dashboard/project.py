@@ -149,7 +149,7 @@ class _Reader:
             if kind == RUN_FILE:
                 self.runs.append(read_run(self.root, folder, self.sceneries, self.odd))
             elif kind == SUITE_FILE:
-                suite = read_suite_line(self.root, folder, self.sceneries)
+                suite = read_suite_line(self.root, folder, self.sceneries, self.odd)
                 self.suites.append(suite)
                 self.problems += [Problem(f"{place}: {name}", why) for name, why in suite.lost]
             elif kind == MAP_FILE:

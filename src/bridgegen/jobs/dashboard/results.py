@@ -206,7 +206,7 @@ class Seen:
         bins: by parameter, evaluations in each bin of its declared range.
         outside: by parameter, evaluations beyond that range.
         bands: by quantity, evaluations in each of its bands, see
-            `bridgegen.jobs.dashboard.taxonomy`.
+            `bridgegen.jobs.dashboard.scenery.BANDS`.
     """
 
     evaluations: int = 0

@@ -61,7 +61,7 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries, odd: ProjectOdd)
 
     def read(store: Store, settings: Settings) -> None:
         seen.append(_seen(store, settings, sceneries))
-        odd.add(store, settings)
+        odd.add_run(store.folder, settings)
 
     line = read_line(project, folder, read)
     settings = line.settings
@@ -214,7 +214,9 @@ class SuiteLine:
     files: Mapping[str, Path] = field(default_factory=dict)
 
 
-def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteLine:
+def read_suite_line(
+    project: Path, folder: Path, sceneries: Sceneries, odd: ProjectOdd
+) -> SuiteLine:
     """Return a suite.
 
     Raises:
@@ -228,6 +230,10 @@ def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteL
         _result(project, source, page, time, made, called, result, sceneries)
         for result in sorted(suite.results, key=lambda result: (result.entry, result.ego))
     )
+    for result in suite.results:
+        files = {name: getattr(result, name) for name in ("scenario", "distribution")}
+        here = {name: str(_path(project, text)) if text else "" for name, text in files.items()}
+        odd.add_entry(suite, result.model_copy(update=here))
     egos = tuple(dict.fromkeys(result.driver.label for result in results))
     lost = tuple(
         (f"{result.entry} ({result.ego})" if result.ego else result.entry, result.problem)

@@ -1,7 +1,7 @@
 """What a scenario states of the taxonomy: facts, quantities, and the declared ranges."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,22 +11,24 @@ import numpy as np
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import BridgeGenError
 from bridgegen.jobs.dashboard.results import Seen, scenario_name
-from bridgegen.jobs.dashboard.taxonomy import QUANTITIES
 from bridgegen.jobs.search.scenarios import load, within
 from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.openx.opendrive.model import OpenDrive, Road
-from bridgegen.openx.openscenario.bodies import kind_of
 from bridgegen.scenario.language.expression import Expression
 from bridgegen.scenario.language.parameters import Parameter
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
-from bridgegen.scenario.odd.states import facts_of_roads, states_of
-from bridgegen.scenario.odd.states import kind_of as kind_of_participant
+from bridgegen.scenario.odd.states import facts_of_roads, states_of, table
 
 BINS = 10
 """Number of bins of a declared range; a parameter of whole numbers has one for each, up to
 ``MOST_BINS``."""
 
 MOST_BINS = 40
+
+BANDS: Mapping[str, Sequence[float]] = {
+    name: entry["upper"] for name, entry in table().quantities.items() if "upper" in entry
+}
+"""Upper limits of the bands in which evaluations of a quantity are counted, ascending."""
 
 Columns = Mapping[str, Float]
 """Values of parameters by name, ``(N,)`` each, with those that stand at their default."""
@@ -95,7 +97,7 @@ class Scenery:
             if outside := int(n - inside.sum()):
                 found.outside[name] = outside
         for name, of in self.quantities.items():
-            upper = QUANTITIES[name].upper
+            upper = BANDS[name]
             if not of.names <= filled.keys():
                 continue  # of a column that the result does not hold
             x = np.broadcast_to(of.evaluate(filled), (n,))
@@ -120,10 +122,11 @@ def scenery_of(scenario: SearchedScenario, *, on_map: bool = False) -> Scenery:
         defaults = scenario.usual_values()
         states = states_of(scenario, on_map=on_map)
         facts = set(states.facts) | (set() if on_map else facts_of_roads(scenario.roads))
-        quantities = {name: of for name, of in states.quantities.items() if name in QUANTITIES}
+        quantities = {name: of for name, of in states.quantities.items() if name in BANDS}
         partly = "roads of a map that a scenario is placed on" if on_map else ""
     elif isinstance(scenario, FileScenario):
-        facts, quantities, partly = _of_file(scenario), {}, _OF_FILES
+        facts = {*scenario.states().facts, *_facts_of_map(scenario.roads.model)}
+        quantities, partly = {}, _OF_FILES
     else:
         facts, quantities, partly = set[str](), {}, "all but the parameters"
     return Scenery(
@@ -145,16 +148,6 @@ _ROAD_TYPES = {
     "lowSpeed": "town",
 }
 """OpenDRIVE's types of roads, by BridgeGen's."""
-
-
-def _of_file(scenario: FileScenario) -> set[str]:
-    """Return the facts of a scenario file and its map."""
-    facts = set[str]()
-    for obj in scenario.storyboard.entities.scenario_objects:
-        kind = kind_of(obj.entity_object) if str(obj.name).lower() != "ego" else None
-        if kind is not None and kind.takes_part:
-            facts.add(f"participant:{kind_of_participant(kind.name)}")
-    return facts | _facts_of_map(scenario.roads.model)
 
 
 def _facts_of_map(roads: OpenDrive) -> set[str]:

@@ -9,7 +9,13 @@ from bridgegen.jobs.risk.estimators.weighted import Probability
 from bridgegen.jobs.risk.options import WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS
 from bridgegen.jobs.risk.result import Finding, ParameterShare, Risk
-from bridgegen.jobs.risk.text import data_sentence, elsewhere_sentence, interval, sentence
+from bridgegen.jobs.risk.text import (
+    crashes,
+    data_sentence,
+    elsewhere_sentence,
+    interval,
+    sentence,
+)
 from bridgegen.pages import charts, templates
 from bridgegen.pages.templates import Banner, number, odds
 
@@ -101,6 +107,7 @@ def unsure(risk: Risk) -> Iterator[str]:
         yield "Few data: the exposure's numbers are taken as they are."
     yield risk.exposure.left_out
     yield f"Where the exposure comes from: {risk.exposure.source}"
+    yield from crashes(risk)
     yield (
         "The simulation: drivers, participants, sensors and friction are those of the embedded "
         "simulator."

@@ -22,6 +22,7 @@ from bridgegen.jobs.risk.options import FIGURES, WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS, INJURY, Column, DataBand
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.scenario.exposure.exposure import Rate
+from bridgegen.scenario.typology import published
 
 RECORD, PAGE, TABLE = "risk.json", "risk.html", "harmful.csv"
 MOST_ROWS = 100_000  # of the table
@@ -217,6 +218,7 @@ class Risk:
         return {
             "scenario": exposure.scenario.name,
             "driver": self.driver,
+            "crash_types": published(exposure.scenario.name),
             "exposure": {
                 "source": exposure.source,
                 "feasible_share": share.estimate,

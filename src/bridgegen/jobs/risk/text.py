@@ -11,6 +11,7 @@ from bridgegen.jobs.risk.outcomes import EVENTS, DataBand
 from bridgegen.jobs.risk.result import PAGE, Risk
 from bridgegen.pages.templates import number
 from bridgegen.scenario.exposure.exposure import Rate
+from bridgegen.scenario.typology import published
 
 
 def sentence(risk: Risk) -> str:
@@ -58,10 +59,22 @@ def lines(risk: Risk) -> Iterator[str | Table]:
         yield f"{'check':<12}{value} ({width}) in {risk.check.evaluations:,} by mc"
     if risk.data is not None:
         yield f"{'data':<12}{data_sentence(risk.data)}"
+    for crash in crashes(risk):
+        yield f"{'crashes':<12}{crash}"
     yield f"{'parameters':<12}{risk.exposure.left_out}"
     if risk.elsewhere is not None:
         yield f"{'elsewhere':<12}{elsewhere_sentence(risk.elsewhere)}"
     yield f"{'page':<12}{risk.folder / PAGE}"
+
+
+def crashes(risk: Risk) -> Iterator[str]:
+    """Yield which published types of crashes, of human drivers, the scenario is one way of."""
+    for each in published(risk.exposure.scenario.name):
+        year = "" if str(each["year"]) in each["of"] else f", {each['year']}"
+        yield (
+            f"{each['type']} is the type of {percent(each['percent'] / 100)} of {each['of']}{year} "
+            f"({each['source']}): of human drivers, no risk of the ego's"
+        )
 
 
 _AMOUNTS = {"h": "hours", "km": "km"}

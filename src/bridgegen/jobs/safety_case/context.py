@@ -174,7 +174,8 @@ def assumptions(runs: Sequence[Facts]) -> Iterator[tuple[str, str]]:
         "#in-short",
     )
     yield (
-        "Responsibility follows from right-hand traffic and German law where rules differ; what "
+        "Responsibility follows from German law where rules differ, but for who goes first where a "
+        "country is stated; in a mirror where traffic drives on the left; what "
         f"a careful driver prevents is judged by {CAREFUL_DRIVER}.",
         "#traffic-behaviour",
     )

@@ -9,7 +9,7 @@ from bridgegen.assess.conflict.harm import Count
 from bridgegen.assess.conflict.quantities import HARM, QUANTITIES
 from bridgegen.assess.metrics import read
 from bridgegen.assess.objective import RULES, Objectives
-from bridgegen.base.errors import InputError, UnknownNameError, UnsupportedError
+from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.forms import read_names
 from bridgegen.openx.file_scenario import FileScenario, load_file_scenario, with_triggers
@@ -121,18 +121,12 @@ def within(
     Raises:
         FileFormatError: it is damaged, or has a unit of another dimension.
         ScenarioError: it excludes every row.
-        UnsupportedError: a scenario file, of whose attributes too little is read.
     """
     if odd is None:
         return scenario
     from bridgegen.scenario.odd.bounding import bounded
     from bridgegen.scenario.odd.reader import odd_of, read_odd
 
-    if not isinstance(scenario, LogicalScenario):
-        raise UnsupportedError(
-            f"{scenario.name}: an ODD bounds scenarios of YAML; of an OpenSCENARIO file, weather "
-            "and speeds are not read"
-        )
     read = odd_of(odd) if isinstance(odd, Mapping) else read_odd(odd)
     return bounded(scenario, read, on_map=road_map is not None)
 

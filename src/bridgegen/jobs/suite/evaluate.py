@@ -156,12 +156,11 @@ def rows_of_job(job: Job, pipeline: Pipeline) -> np.ndarray:
     Raises:
         InputError: it has not the one that is asked for.
     """
-    return _rows_of(job, pipeline).X
+    return run_of(job, pipeline.scenario, pipeline.space).X
 
 
-def _rows_of(job: Job, pipeline: Pipeline) -> Rows:
-    """Return what is run of an entry."""
-    scenario, space = pipeline.scenario, pipeline.space
+def run_of(job: Job, scenario: SearchedScenario, space: SearchSpace) -> Rows:
+    """Return what is run of an entry; see `rows_of_job`."""
     if job.draw is not None:
         found = drawn(scenario, space, job.draw, job.entry.digest)
     else:
@@ -180,7 +179,7 @@ def _rows_of(job: Job, pipeline: Pipeline) -> Rows:
 def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     pipeline = pipeline_of(job)
     space = pipeline.space
-    given = _rows_of(job, pipeline)
+    given = run_of(job, pipeline.scenario, space)
     X, names = given.X, given.names
     notes = [*pipeline.scenario.notes, *pipeline.runner.notes]
     if given.excluded:

@@ -248,15 +248,6 @@ class EntryResult(Strict):
         # Failures stay: only what would pass says nothing.
         return found.replace(PASSED, NOT_APPLICABLE).replace(EXCUSED, NOT_APPLICABLE)
 
-    def worst_of(self, criterion: int) -> int | None:
-        """Return the number of the row that violates a criterion the most, or None."""
-        margins = [
-            (row.margins[criterion], i)
-            for i, row in enumerate(self.rows)
-            if criterion < len(row.margins) and row.margins[criterion] < 0.0
-        ]
-        return min(margins)[1] if margins else None
-
 
 class Header(Strict):
     """What all lines of a file of results have in common.

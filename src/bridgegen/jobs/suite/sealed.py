@@ -5,7 +5,7 @@ import json
 import os
 import secrets
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -33,8 +33,16 @@ from bridgegen.jobs.suite.evaluate import (
 from bridgegen.jobs.suite.failing import seeking_causes, ways
 from bridgegen.jobs.suite.options import SAMPLES, SUITE, SuiteOptions
 from bridgegen.jobs.suite.replay import job_of
-from bridgegen.jobs.suite.results import EntryResult, Strict, rank
-from bridgegen.jobs.suite.suite import SEALED, SuiteRun, check, default_folder, run_entries
+from bridgegen.jobs.suite.results import EntryResult, Strict, counts, rank
+from bridgegen.jobs.suite.suite import (
+    SEALED,
+    SuiteRun,
+    check,
+    default_folder,
+    run_entries,
+    settings_of,
+)
+from bridgegen.simulation.choice import EMBEDDED
 
 BEYOND = "outside.jsonl"
 """File in the folder of the results, of what lies outside the ranges."""
@@ -48,17 +56,21 @@ most: a sealed file of more could not be read."""
 
 
 class Key(Strict):
-    """An assessor's key: 32 random bytes, and of which scenarios (digests by name) it draws."""
+    """An assessor's key: 32 random bytes, of which scenarios it draws, and what judges these.
+
+    Scenarios are digests by name; ``judged`` has the settings that bound and judge.
+    """
 
     assessor: Literal[1] = 1
     secret: str = Field(pattern="^[0-9a-f]{64}$")
     number: int = Field(ge=LEAST, le=MOST)
     scenarios: dict[str, str]
+    judged: dict[str, Any]
     version: str
     commitment: str = ""
 
-    def require(self, entries: Sequence[Entry], place: Path) -> None:
-        """Refuse what is not as it was committed to: the key, the scenarios, the version.
+    def require(self, entries: Sequence[Entry], settings: Mapping[str, Any], place: Path) -> None:
+        """Refuse what is not as it was committed to: key, scenarios, what judges them, version.
 
         Raises:
             InputError: it is not.
@@ -70,6 +82,10 @@ class Key(Strict):
             )
         if self.version != version("bridgegen"):
             raise InputError(f"{place}: was drawn by another version: {self.version[:40]}")
+        if odd := [name for name, was in self.judged.items() if was != _judged(settings)[name]]:
+            raise InputError(
+                f"{place}: what bounds and judges must be as the key says; not: {', '.join(odd)}"
+            )
         known, given = {*self.scenarios.values()}, {entry.digest for entry in entries}
         odd = [name for name, digest in self.scenarios.items() if digest not in given]
         odd += [entry.name for entry in entries if entry.digest not in known]
@@ -109,8 +125,21 @@ def hash_of(model: BaseModel, without: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def commit(path: Path, files: Sequence[str], number: int) -> list[str]:
+def _judged(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of a suite's settings bounds and judges, an ODD by its digest."""
+    names = ("criteria", "critical", "count", "others", "empty_trigger")
+    found: dict[str, Any] = json.loads(json.dumps({name: settings[name] for name in names}))
+    return {"odd": (settings.get("odd") or {}).get("sha256")} | found
+
+
+def commit(path: Path, files: Sequence[str], number: int, **judged: Any) -> list[str]:
     """Write a new key, which only its owner can read, and return what to say of it.
+
+    Args:
+        path: of the key.
+        files: the scenarios.
+        number: of variations of each.
+        judged: options of the suite that bound and judge them; see `_judged`.
 
     Raises:
         InputError: a scenario cannot be read, or the number is out of range.
@@ -123,7 +152,14 @@ def commit(path: Path, files: Sequence[str], number: int) -> list[str]:
     if broken := [entry.name for entry in entries if entry.problem or not entry.digest]:
         raise InputError(f"cannot be read: {', '.join(broken)}")
     digests, ours = {entry.name: entry.digest for entry in entries}, version("bridgegen")
-    key = Key(secret=secrets.token_hex(32), number=number, scenarios=digests, version=ours)
+    given = settings_of(SuiteOptions(files=files, **judged), EMBEDDED)
+    key = Key(
+        secret=secrets.token_hex(32),
+        number=number,
+        scenarios=digests,
+        judged=_judged(given),
+        version=ours,
+    )
     key = key.model_copy(update={"commitment": hash_of(key, "commitment")})
     try:
         # Never over another key: its hash may be published.
@@ -148,7 +184,7 @@ def assess(given: SuiteOptions, key_file: Path) -> SuiteRun:
     """
     files = [given.files] if isinstance(given.files, str | Path) else list(given.files)
     key = _read(key_file, Key)
-    key.require(entries := find_entries(files), key_file)
+    key.require(entries := find_entries(files), settings_of(given, given.simulator), key_file)
     if key.number * len(entries) * len({*given.egos}) > MOST:
         raise InputError(f"variations of all drivers must be {MOST:,} at most: name fewer (--ego)")
     if (given.samples, given.seed, given.matrix) != (SAMPLES, 0, None):
@@ -174,7 +210,7 @@ def assess(given: SuiteOptions, key_file: Path) -> SuiteRun:
 
 def verify(
     path: Path, files: Sequence[str], published: Sequence[str], egos: Sequence[str]
-) -> list[str]:
+) -> tuple[list[str], bool]:
     """Verify a sealed result: its seal, its key's hash, its variations; and run it again.
 
     Args:
@@ -185,7 +221,8 @@ def verify(
             its root cause; any other one is a re-test of its failures.
 
     Returns:
-        What was verified, and what not, in lines.
+        What was verified, and what not, in lines; and whether a variation of a re-test fails or
+        did not run.
 
     Raises:
         InputError: it was altered, is not what was published, or its scenarios have changed.
@@ -193,7 +230,7 @@ def verify(
     """
     sealed, entries = _read(path, Sealed), find_entries(files)
     known = {sealed.key.commitment: "the key's hash", sealed.seal: "the seal"}
-    sealed.key.require(entries, path)
+    sealed.key.require(entries, sealed.settings, path)
     if sealed.seal != hash_of(sealed, "seal"):
         raise InputError(f"{path}: was altered: its content does not have the seal {sealed.seal}")
     if odd := [text for text in published if text not in known]:
@@ -202,14 +239,16 @@ def verify(
     jobs = list(_jobs(path, sealed, entries))
     texts = ", ".join(known[text] for text in published) or "nothing compared (--published HASH)"
     unrun = sum(bool(result.problem) for _, result in jobs)
-    return [
+    again = [_again(path, sealed, jobs, ego) for ego in egos]
+    lines = [
         *(f"{name:<16}{text}" for text, name in known.items()),
         f"published       {texts}",
         f"variations      {sum(len(result.rows) for _, result in jobs):,}, as the key draws them"
         + (f"; {unrun} results did not run" if unrun else ""),
-        *(line for ego in egos for line in _again(path, sealed, jobs, ego)),
+        *(line for of_ego, _ in again for line in of_ego),
         *([] if egos else ["run again       nothing (--ego DRIVER)"]),
     ]
+    return lines, any(fails for _, fails in again)
 
 
 def _jobs(
@@ -240,8 +279,11 @@ def _jobs(
 
 def _again(
     path: Path, sealed: Sealed, jobs: Sequence[tuple[Job, EntryResult]], ego: str
-) -> Iterator[str]:
-    """Yield what a driver makes of the sealed variations: the same again, or a re-test."""
+) -> tuple[list[str], bool]:
+    """Return what a driver makes of the sealed variations: the same again, or a re-test.
+
+    A re-test fails as a suite does.
+    """
     own = identity_of(ego, digest_of(ego))
     who = [identity_of(old.ego or old.driver, old.driver_digest) for _, old in jobs]
     same = [pair for pair, driver in zip(jobs, who, strict=True) if driver.content == own.content]
@@ -255,17 +297,18 @@ def _again(
         failures = [one for one in sealed.failures if one.ego == before[0][1].ego]
         if [old for _, old in same] != results or _failures(again[:n], results[:n]) != failures:
             raise InputError(f"{path}: was altered, or {ego} has chance in it: results differ")
-        yield f"run again       {ego}: the same results and root causes, to the bit"
-        return
+        return [f"run again       {ego}: the same results and root causes, to the bit"], False
     first, second = labels_of([who[0], own])
     found = difference([old for _, old in before[:n]], results[:n], (first, second))
     changes = {(row.entry, row.row + 1): row.change for row in found.rows}
-    yield f"re-test         {found.headline}"
+    lines = [f"re-test         {found.headline}"]
     for one in sealed.failures:
         if one.ego == before[0][1].ego:
             change = changes.get((one.entry, one.number), "not comparable")
             cause = one.cause or "no cause found"
-            yield f"  {one.entry} {one.number}, {change}: {one.title} · {cause}"
+            lines.append(f"  {one.entry} {one.number}, {change}: {one.title} · {cause}")
+    number, unsure = counts(results[:n]), any(r.verdict == "not judged" for r in results[:n])
+    return lines, bool(number["failed"] or number["not run"] or unsure)
 
 
 def _failures(jobs: Iterable[Job], results: Iterable[EntryResult]) -> list[Failure]:

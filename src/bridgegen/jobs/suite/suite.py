@@ -193,7 +193,7 @@ def run_entries(
     entries = of_edition(find_entries(files), given.matrix)
     drivers = tuple(dict.fromkeys(given.egos)) or ("",)
     folder = Path(given.out) if given.out is not None else default_folder(files)
-    settings = _settings(given, simulator) | ({"driver_name": name} if name else {})
+    settings = settings_of(given, simulator) | ({"driver_name": name} if name else {})
     settings |= {"secret": draw.secret, "drawn": draw.number} if draw else {}
     jobs = [
         Job(
@@ -280,7 +280,7 @@ def default_folder(files: Sequence[str | Path]) -> Path:
     return folder
 
 
-def _settings(options: ScenariosOptions, simulator: SimulatorChoice) -> dict[str, Any]:
+def settings_of(options: ScenariosOptions, simulator: SimulatorChoice) -> dict[str, Any]:
     """Return what results depend on besides the files, as JSON's types."""
     return {
         "samples": options.samples,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float
-from bridgegen.scenario.language.constraints import Constraints
+from bridgegen.base.errors import UnsupportedError
+from bridgegen.scenario.language.constraints import Constraints, order
 from bridgegen.scenario.language.kinds import slack
 from bridgegen.scenario.language.parameters import Axis, Bound, Derived, Parameter, at
 from bridgegen.scenario.language.roads import RoadsSpec
@@ -142,6 +143,23 @@ class SearchedScenario:
     def decisions(self) -> tuple[str, ...]:
         """The parameters that are an adversary's decisions."""
         return ()
+
+    def usual_values(self) -> dict[str, float]:
+        """Return the defaults of the parameters, and the derived quantities that follow."""
+        values = {name: parameter.default for name, parameter in self.parameters.items()}
+        derived = {each.name: each.value for each in self.derived}
+        for name in order((*values, *derived), self.bounds, self.derived):
+            if name in derived:
+                values[name] = float(derived[name].evaluate(values))
+        return values
+
+    def states(self) -> Any:
+        """Return what it states of an ODD, a `bridgegen.scenario.odd.states.States`.
+
+        Raises:
+            UnsupportedError: nothing that is read.
+        """
+        raise UnsupportedError(f"{self.name}: nothing of it is read that an ODD asks")
 
     def broken(self, table: Mapping[str, Float]) -> dict[str, Bool]:
         """Return which rows break a check, ``(N,)`` by the rule; a rule that all keep is left out.
@@ -340,13 +358,6 @@ class LogicalScenario(SearchedScenario):
             KeyError: no such participant.
         """
         return {item.name: item for item in self.participants}[name]
-
-    def usual_values(self) -> dict[str, float]:
-        """Return the defaults of the parameters, and the derived quantities that follow."""
-        values = {name: parameter.default for name, parameter in self.parameters.items()}
-        for derived in self.derived:
-            values[derived.name] = float(derived.value.evaluate(values))
-        return values
 
     def measured(self, values: Mapping[str, float]) -> "LogicalScenario":
         """Return this scenario at a place where some parameters are what they are.

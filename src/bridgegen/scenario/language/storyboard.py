@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,10 @@ WEATHER_STEPS = 5
 """Steps of a weather that changes over a time."""
 
 _OF_EVENTS = ("after", "began")
+_OF_DISTANCE = {
+    "distance": "m", "time": "s", "acceleration": "m/s²", "braking": "m/s²", "max_speed": "m/s",
+}  # fmt: skip
+"""What one that keeps its distance may be given, and its units."""
 
 _OFF_LANES = tuple(
     name
@@ -191,23 +196,7 @@ class Storyboard:
             )
         if given.type == "pedestrian" and not given.off_crosswalk:
             self._places.check_crossing(name, points, path)
-        driver = given.driver or ""
-        return Participant(
-            name,
-            given.type,
-            points[0],
-            None,
-            given.speed,
-            points,
-            driver=driver,
-            exceeds_limit=given.exceeds_limit or "",
-            off_crosswalk=given.off_crosswalk or "",
-            siren=given.siren,
-            own_body=_body(given),
-            type_by=given.type_by or "",
-            types=self._choices.types(given),
-            model=given.model or "",
-        )
+        return self._participant(name, given, points[0], path=points)
 
     def _driver(
         self, name: str, given: ParticipantSection, place: WaypointSection, path: Path
@@ -247,14 +236,17 @@ class Storyboard:
             )
         if conduct == "vehicle" and start.lane == "sidewalk":
             self._report(f"{name} must stand on a lane: vehicles are on roads only", path)
+        return self._participant(name, given, start, end=end, heading=given.heading, change=change)
+
+    def _participant(
+        self, name: str, given: ParticipantSection, start: Waypoint, **more: Any
+    ) -> Participant:
         return Participant(
             name,
             given.type,
             start,
-            end,
-            given.speed,
+            speed=given.speed,
             driver=given.driver or "",
-            heading=given.heading,
             exceeds_limit=given.exceeds_limit or "",
             off_crosswalk=given.off_crosswalk or "",
             siren=given.siren,
@@ -262,7 +254,7 @@ class Storyboard:
             type_by=given.type_by or "",
             types=self._choices.types(given),
             model=given.model or "",
-            change=change,
+            **{"end": None, **more},
         )
 
     def _ghosts(self) -> Iterator[Ghost]:
@@ -405,12 +397,7 @@ class Storyboard:
             self._report(f"{name} is an obstacle, which has no driver; got '{driver}'", place)
 
     def _check_route(
-        self,
-        name: str,
-        start: Waypoint,
-        end: Waypoint,
-        given: ParticipantSection,
-        path: Path,
+        self, name: str, start: Waypoint, end: Waypoint, given: ParticipantSection, path: Path
     ) -> None:
         if not {start.leg, end.leg} <= {*self._roads.leg_names}:
             return  # reported where the place was read
@@ -425,18 +412,12 @@ class Storyboard:
                     path,
                 )
             return
-        if start.way != "in":
-            got = _point(start) if by_points else str(start)
-            which = ", ".join(f"P{2 * LETTERS.index(leg) + 1}" for leg in self._roads.legs)
-            self._report(
-                f"a route starts where an inbound lane does: {which}, got {got}", (*path, "start")
-            )
-        if end.way != "out":
-            got = _point(end) if by_points else str(end)
-            which = ", ".join(f"P{2 * LETTERS.index(leg) + 2}" for leg in self._roads.legs)
-            self._report(
-                f"a route ends where an outbound lane does: {which}, got {got}", (*path, "end")
-            )
+        for place, way, number, word in ((start, "in", 1, "start"), (end, "out", 2, "end")):
+            if place.way != way:
+                got = _point(place) if by_points else str(place)
+                which = ", ".join(f"P{2 * LETTERS.index(leg) + number}" for leg in self._roads.legs)
+                what = f"a route {word}s where an {way}bound lane does: {which}, got {got}"
+                self._report(what, (*path, word))
         back = start.leg == end.leg and start.way == "in" and end.way == "out"
         if back and self._roads.template != "roundabout":
             self._report(
@@ -630,23 +611,11 @@ class Storyboard:
             place = (*path, "keep_distance")
             if (keeps.distance is None) == (keeps.time is None):
                 self._report(f"{name} keeps a distance or a time, one of them", place)
-            for value, unit, part in (
-                (keeps.distance, "m", "distance"),
-                (keeps.time, "s", "time"),
-                (keeps.acceleration, "m/s²", "acceleration"),
-                (keeps.braking, "m/s²", "braking"),
-                (keeps.max_speed, "m/s", "max_speed"),
-            ):
+            values = {part: getattr(keeps, part) for part in _OF_DISTANCE}
+            for part, value in values.items():
                 if value is not None:
-                    self._check(value, unit, (*place, part), above=True)
-            yield KeepDistance(
-                keeps.to,
-                keeps.distance,
-                keeps.time,
-                keeps.acceleration,
-                keeps.braking,
-                keeps.max_speed,
-            )
+                    self._check(value, _OF_DISTANCE[part], (*place, part), above=True)
+            yield KeepDistance(keeps.to, **values)
         if arrives is not None:
             places = [
                 self._places.waypoint(waypoint_section, (*path, "arrive", key))
@@ -671,13 +640,13 @@ class Storyboard:
         return Change(rate, time, distance, shape)  # type: ignore[arg-type]
 
     def _conditions(
-        self, event: EventSection, condition_section: ConditionSection, path: Path
+        self, event: EventSection, given: ConditionSection, path: Path
     ) -> Iterator[ConditionSpec]:
         """Yield the conditions of one alternative."""
-        if condition_section.all:
-            if condition_section.kind is not None:
+        if given.all:
+            if given.kind is not None:
                 self._report("an alternative is a condition, or 'all' of several, not both", path)
-            for number, each in enumerate(condition_section.all):
+            for number, each in enumerate(given.all):
                 if each.kind == "began":
                     self._report(
                         "a 'began' condition holds for an instant, so it stands alone, not in "
@@ -686,60 +655,40 @@ class Storyboard:
                     )
                 yield from self._conditions(event, each, (*path, "all", number))
             return
-        if condition_section.kind is None:
+        if given.kind is None:
             self._report(f"a condition must have a kind: {', '.join(CONDITIONS)}", path)
             return
-        kind, subject = (
-            CONDITIONS[condition_section.kind],
-            condition_section.of or event.participant,
-        )
-        self._check(condition_section.value, kind.unit, (*path, "value"))
-        if condition_section.kind == "contact" and condition_section.value != 0.0:
+        kind, subject = CONDITIONS[given.kind], given.of or event.participant
+        self._check(given.value, kind.unit, (*path, "value"))
+        if given.kind == "contact" and given.value != 0.0:
+            self._report(f"a contact condition has no value, got {given.value}", (*path, "value"))
+        if given.kind in _OF_EVENTS and isinstance(given.value, str):
             self._report(
-                f"a contact condition has no value, got {condition_section.value}", (*path, "value")
-            )
-        if condition_section.kind in _OF_EVENTS and isinstance(condition_section.value, str):
-            self._report(
-                f"value of an '{condition_section.kind}' condition [s] must be a constant, got "
-                f"'{condition_section.value}': "
+                f"value of an '{given.kind}' condition [s] must be a constant, got "
+                f"'{given.value}': "
                 "delays are part of the storyboard, which is the same for all rows",
                 (*path, "value"),
             )
-        if not kind.pair and condition_section.to is not None:
-            self._report(
-                f"a {condition_section.kind} condition has no 'to', got '{condition_section.to}'",
-                path,
-            )
-        if kind.pair and condition_section.to is None:
-            self._report(
-                f"a {condition_section.kind} condition needs 'to', the other participant", path
-            )
+        if not kind.pair and given.to is not None:
+            self._report(f"a {given.kind} condition has no 'to', got '{given.to}'", path)
+        if kind.pair and given.to is None:
+            self._report(f"a {given.kind} condition needs 'to', the other participant", path)
         elif kind.pair:
-            self._check_participant(str(condition_section.to), (*path, "to"))
-            if condition_section.to == subject:
+            self._check_participant(str(given.to), (*path, "to"))
+            if given.to == subject:
                 self._report(
-                    f"a {condition_section.kind} is to another participant, got "
-                    f"'{condition_section.to}' twice",
-                    path,
+                    f"a {given.kind} is to another participant, got '{given.to}' twice", path
                 )
-        if condition_section.of is not None:
-            self._check_participant(condition_section.of, (*path, "of"))
-        elif subject is None and condition_section.kind not in ("time", *_OF_EVENTS):
-            self._report(f"a {condition_section.kind} condition needs 'of', whose it is", path)
-        if (condition_section.kind in _OF_EVENTS) != (condition_section.event is not None):
+        if given.of is not None:
+            self._check_participant(given.of, (*path, "of"))
+        elif subject is None and given.kind not in ("time", *_OF_EVENTS):
+            self._report(f"a {given.kind} condition needs 'of', whose it is", path)
+        if (given.kind in _OF_EVENTS) != (given.event is not None):
             self._report("an 'after' or 'began' condition, and no other, names an event", path)
-        elif (
-            condition_section.event is not None and condition_section.event not in self._event_names
-        ):
-            hint = nearest(condition_section.event, self._event_names)
-            self._report(f"unknown event '{condition_section.event}'{hint}", path)
-        yield ConditionSpec(
-            condition_section.kind,
-            condition_section.value,
-            condition_section.to,
-            condition_section.of,
-            condition_section.event,
-        )
+        elif given.event is not None and given.event not in self._event_names:
+            hint = nearest(given.event, self._event_names)
+            self._report(f"unknown event '{given.event}'{hint}", path)
+        yield ConditionSpec(given.kind, given.value, given.to, given.of, given.event)
 
     def _check_participant(self, name: str, path: Path) -> None:
         if name not in self.known:
@@ -761,10 +710,7 @@ def _body(given: ParticipantSection) -> Body | None:
     said = {key: value for key, value in given.body.model_dump().items() if value is not None}
     longer = said.get("length", usual.length) / usual.length
     return replace(
-        usual,
-        center_ahead=usual.center_ahead * longer,
-        wheelbase=usual.wheelbase * longer,
-        **said,
+        usual, center_ahead=usual.center_ahead * longer, wheelbase=usual.wheelbase * longer, **said
     )
 
 

@@ -11,7 +11,7 @@ from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import ScenarioError
 from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.parameters import Axis, Bound, Parameter
-from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.scenario.odd.reader import Condition, Group, Odd
 from bridgegen.scenario.odd.states import (
     LONG,
@@ -35,6 +35,8 @@ Tree = "bool | Term | tuple[str, tuple[Tree, ...]]"
 
 class OddBound(Bound):
     """A bound that an ODD asks for, and reads as the ODD says it."""
+
+    SOURCE = "the operational design domain"
 
     def __str__(self) -> str:
         return self.why
@@ -123,7 +125,7 @@ class Fit:
         return (*lines, *(f"{name}: {note}" for note in self.odd.notes))
 
 
-def bounded(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> LogicalScenario:
+def bounded(scenario: SearchedScenario, odd: Odd, *, on_map: bool = False) -> SearchedScenario:
     """Return a scenario all of whose rows lie in an ODD, as far as it states its attributes.
 
     Ranges are narrowed where a condition asks for it; combinations become bounds of what is
@@ -150,7 +152,7 @@ def bounded(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> Log
     return replace(found, notes=(*scenario.notes, *maker.tried(found), *fit.to_lines()))
 
 
-def fit_of(scenario: LogicalScenario, odd: Odd, *, on_map: bool = False) -> Fit:
+def fit_of(scenario: SearchedScenario, odd: Odd, *, on_map: bool = False) -> Fit:
     """Return what an ODD asks of a scenario's rows; the scenario stays as it is.
 
     Args:
@@ -257,10 +259,15 @@ def _met(clause: tuple[Term, ...], columns: Mapping[str, Any], n: int) -> Bool:
     return found
 
 
+def _span(parameter: Parameter) -> str:
+    ends = parameter.low, parameter.high
+    return parameter.kind.span_text(*ends, "{:.4g}".format, f" {parameter.unit}")
+
+
 class _Maker:
     """Brings clauses into a scenario, one after the other."""
 
-    def __init__(self, scenario: LogicalScenario, where: str) -> None:
+    def __init__(self, scenario: SearchedScenario, where: str) -> None:
         self.scenario, self.where = scenario, where
         self.checks: list[Bound] = []
         self.declared, self.narrowed = scenario.parameters, dict[str, list[str]]()
@@ -351,42 +358,34 @@ class _Maker:
 
     def _narrow(self, name: str, clause: tuple[Term, ...], said: str) -> bool:
         parameter = self.scenario.parameters[name]
+        if getattr(parameter, "distribution", None) is not None:
+            return False  # a file gives how it is drawn, whatever its range
         ends = self._interval(name, clause)
-        span = parameter.kind.span_text(
-            parameter.low, parameter.high, "{:.4g}".format, f" {parameter.unit}"
-        )
         if ends is True:
             return True
         if ends is False:
             asked = " and ".join((*self.narrowed.get(name, ()), said))
-            declared = self.declared[name]
-            span = declared.kind.span_text(
-                declared.low, declared.high, "{:.4g}".format, f" {declared.unit}"
-            )
-            raise ScenarioError(f"{self.where}: it asks {asked}, {name} is {span}")
+            declared = _span(self.declared[name])
+            raise ScenarioError(f"{self.where}: it asks {asked}, {name} is {declared}")
         if ends is None:
             return False
         low, high = ends
-        changed = replace(
-            parameter,
-            low=low,
-            high=high,
-            default=float(np.clip(parameter.default, low, high)),
-        )
+        usual = float(np.clip(parameter.default, low, high))
+        changed = replace(parameter, low=low, high=high, default=usual)
         found = replace(self.scenario, parameters=self.scenario.parameters | {name: changed})
         if not self._all_fit(found):
             return False
         self.scenario = found
-        now = parameter.kind.span_text(low, high, "{:.4g}".format, f" {parameter.unit}")
         self.narrowed.setdefault(name, []).append(said)
-        self.changes.append(f"{said}: {name} is {now}, declared {span}")
+        self.changes.append(f"{said}: {name} is {_span(changed)}, declared {_span(parameter)}")
         return True
 
     def _bind(self, name: str, clause: tuple[Term, ...], said: str) -> bool:
         """Bound a parameter by the others of a clause; say whether that was possible."""
         own = tuple(term for term in clause if self._sources(term.formula) == {name})
         others = tuple(term for term in clause if term not in own)
-        if not own or any(name in self._sources(term.formula) for term in others):
+        drawn = getattr(self.scenario.parameters[name], "distribution", None)
+        if drawn or not own or any(name in self._sources(term.formula) for term in others):
             return False
         ends = self._interval(name, own)
         if ends is False:
@@ -402,7 +401,7 @@ class _Maker:
             else parse(f"{end!r} if {test.formula} else {limit!r}", "", categories, longest=LONG)
             for limit, end in zip(ends, (parameter.low, parameter.high), strict=True)
         ]
-        rule = OddBound(name, sides[0], sides[1], said, "the operational design domain")
+        rule = OddBound(name, sides[0], sides[1], said, OddBound.SOURCE)
         found = replace(self.scenario, bounds=(*self.scenario.bounds, rule))
         if not self._all_fit(found):
             return False
@@ -416,12 +415,10 @@ class _Maker:
         far = target.high + 2.0 * (1.0 + abs(target.high))
         text = f"{target.low!r} if {test.formula} else {far!r}"
         limit = parse(text, "", dict(test.formula.categories), longest=LONG, deepest=300)
-        self.checks.append(
-            OddBound(target.name, limit, None, said, "the operational design domain")
-        )
+        self.checks.append(OddBound(target.name, limit, None, said, OddBound.SOURCE))
         self.changes.append(f"{said}: rows that break it are refused")
 
-    def tried(self, scenario: LogicalScenario) -> tuple[str, ...]:
+    def tried(self, scenario: SearchedScenario) -> tuple[str, ...]:
         """Return what to know of the checks of a bounded scenario.
 
         Raises:
@@ -438,15 +435,15 @@ class _Maker:
             raise ScenarioError(f"{self.where}: it asks {rules}, and no row of {_SAMPLE:,} does")
         return (f"{broken.mean():.0%} of random rows break what the ODD asks, and are refused",)
 
-    def _columns(self, scenario: LogicalScenario) -> dict[str, Float]:
+    def _columns(self, scenario: SearchedScenario) -> dict[str, Float]:
         space = scenario.space(self.axes[0])
         X = space.decode(np.random.default_rng(0).random((_SAMPLE, space.n_var)))
         return dict(zip(space.names, X.T, strict=True))
 
-    def _all_fit(self, scenario: LogicalScenario) -> bool:
+    def _all_fit(self, scenario: SearchedScenario) -> bool:
         return all(self._fits(scenario, axes) for axes in self.axes)
 
-    def _fits(self, scenario: LogicalScenario, axes: Any) -> bool:
+    def _fits(self, scenario: SearchedScenario, axes: Any) -> bool:
         try:
             scenario.space(axes)
         except ScenarioError:

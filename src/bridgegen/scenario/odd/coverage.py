@@ -149,10 +149,6 @@ def _number(x: float) -> str:
     return f"{x:,.0f}" if abs(x) >= 1000 else f"{x:.4g}"
 
 
-def _finite(x: float) -> float | None:
-    return x if math.isfinite(x) else None
-
-
 def odd_coverage(odd: Odd) -> OddCoverage:
     """Return the attributes of an ODD, of which nothing is covered yet."""
     size = size_of(odd)

@@ -101,8 +101,7 @@ def watched(scenario: LogicalScenario, *, on_map: bool = False) -> Watched | Non
             return None
         odd = odd_in(own)
     size_of(odd)
-    states = states_of(scenario, on_map=on_map)
-    followed = _Followed(scenario, states.facts, states.quantities, on_map)
+    followed = _Followed(**vars(states_of(scenario, on_map=on_map)))
     gaps, refused = dict[str, str](), list[str]()
     tree = tree_of(odd.formula, True, odd, followed, gaps, refused)
     if tree is False:

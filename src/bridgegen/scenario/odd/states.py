@@ -9,13 +9,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 from bridgegen.scenario.language.roads import Quantity, RoadsSpec
-from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
 from bridgegen.scenario.named_models import MODELS
 from bridgegen.scenario.odd.reader import UNKNOWN, Condition, Group, Odd
 from bridgegen.scenario.participants import PARTICIPANTS
@@ -62,12 +62,14 @@ class Table:
         concepts: by the names that files write, in lower case.
         units: by what they measure: the factor into the first.
         terms: of the ontology, by evidence: what states it.
+        attributes: of the standard, by group, each with its evidence and a note.
     """
 
     quantities: Mapping[str, Mapping[str, Any]]
     concepts: Mapping[str, Concept]
     units: Mapping[str, Mapping[str, float]]
     terms: Mapping[str, Sequence[str]]
+    attributes: Mapping[str, Mapping[str, str]]
 
 
 @cache
@@ -84,7 +86,7 @@ def table() -> Table:
             name, entry["at"], entry.get("quantity", ""), entry.get("bands") or {}, facts, types
         )
         concepts |= dict.fromkeys((name, *entry.get("also", ())), found)
-    return Table(data["quantities"], concepts, data["units"], data["terms"])
+    return Table(data["quantities"], concepts, data["units"], data["terms"], data["attributes"])
 
 
 def concept_of(name: str) -> Concept | None:
@@ -115,13 +117,18 @@ class States:
         scenario: the scenario.
         facts: that hold in all its rows.
         quantities: formulas by name; of roads none where they are a map's.
+        others: for each participant but the ego, the types that it may have, and the parameter that
+            chooses one; "" of a single type.
         on_map: whether it takes place on a map, whose roads are not read.
+        unread: why it has no more quantities and facts.
     """
 
-    scenario: LogicalScenario
+    scenario: SearchedScenario
     facts: frozenset[str]
     quantities: Mapping[str, Expression]
-    on_map: bool
+    others: tuple[tuple[tuple[str, ...], str], ...]
+    on_map: bool = False
+    unread: str = "this scenario has none"
 
     def holds(self, condition: Condition, positive: bool, odd: Odd) -> "bool | str | Term":
         """Say when a condition holds, or when it does not.
@@ -153,16 +160,13 @@ class States:
         if concept.quantity:
             formula = self.quantities.get(concept.quantity)
             if formula is None:
-                return self._not_read()
+                return self.unread
             return self._of_quantity(formula, condition, concept, positive, odd)
         if not condition.values:
             return f"{condition.text} is none of its values"
         if concept.types:
             return self._of_types(concept, condition, positive)
         return self._of_facts(concept, condition, positive)
-
-    def _not_read(self) -> str:
-        return "the roads of a map are not read" if self.on_map else "this scenario has none"
 
     def value(self, concept: Concept, row: Mapping[str, float]) -> "float | list[str] | None":
         """Return an attribute of a row: a number in the quantity's unit, values, or None.
@@ -180,15 +184,7 @@ class States:
                 return x if x < STRAIGHT else None
             return [k for k, v in concept.bands.items() if v is not None and v[0] < x <= v[1]][:1]
         if concept.types:
-            kinds = {
-                kind_of(
-                    each.types[round(row[each.type_by])]
-                    if each.type_by
-                    else each.model or each.type
-                )
-                for each in self.scenario.participants
-                if each.name != "ego"
-            }
+            kinds = {kind_of(types[round(row[by]) if by else 0]) for types, by in self.others}
             if tuple(concept.types) == ("true",):
                 return ["true" if kinds & set(concept.types["true"]) else "false"]
             found = {
@@ -218,13 +214,13 @@ class States:
         if tuple(concept.facts) == ("true",):
             met = self._fact(concept.facts["true"])
             if met is None:
-                return self._not_read()
+                return self.unread
             if asked - {"true", "false"}:
                 return f"{condition.text} is none of its values"
             return (("true" if met else "false") in asked) == positive
         known = {value: self._fact(fact) for value, fact in concept.facts.items()}
         if None in known.values():
-            return self._not_read()
+            return self.unread
         present = {concept.facts[value] for value, met in known.items() if met}
         of_asked = {concept.facts[value] for value in asked & known.keys()}
         strange = sorted(asked - known.keys())
@@ -255,15 +251,12 @@ class States:
         inside = one_is_enough or (positive and not is_flag)
         certain: list[bool] = []
         varying: list[str] = []
-        for each in self.scenario.participants:
-            if each.name == "ego":
-                continue
-            types = each.types if each.type_by else (each.model or each.type,)
+        for types, by in self.others:
             fits = [name for name in types if (kind_of(name) in wanted) == inside]
             if len(fits) in (0, len(types)):
                 certain.append(bool(fits))
             else:
-                varying.append(" or ".join(f"{each.type_by} == {name}" for name in fits))
+                varying.append(" or ".join(f"{by} == {name}" for name in fits))
         if one_is_enough in certain or not varying:
             return any(certain) if one_is_enough else all(certain)
         sign = " or " if one_is_enough else " and "
@@ -369,17 +362,24 @@ def in_unit(value: float, condition: Condition, concept: Concept, odd: Odd) -> f
 # -- what a logical scenario states ----------------------------------------------------------------
 
 
-def states_of(scenario: LogicalScenario, *, on_map: bool = False) -> States:
+def states_of(scenario: SearchedScenario, *, on_map: bool = False) -> States:
     """Return what a scenario states.
 
     Args:
         scenario: the scenario.
         on_map: whether it takes place on a map, whose roads are not read.
+
+    Raises:
+        UnsupportedError: one of which nothing is read.
     """
-    others = [each for each in scenario.participants if each.name != "ego"]
-    kinds = {name for each in others for name in (each.types or (each.model or each.type,))}
-    facts = {f"participant:{kind_of(name)}" for name in kinds}
-    facts.discard("participant:other")  # an obstacle
+    if not isinstance(scenario, LogicalScenario):
+        return cast(States, scenario.states())
+    others = tuple(
+        (each.types or (each.model or each.type,), each.type_by)
+        for each in scenario.participants
+        if each.name != "ego"
+    )
+    facts = facts_of_types(others)
     facts |= {"participant:emergency" for each in scenario.participants if each.siren}
     facts |= {"jam"} if scenario.story.jams else set()
     facts |= {"road works", "warning sign"} if scenario.story.works else set()
@@ -400,7 +400,14 @@ def states_of(scenario: LogicalScenario, *, on_map: bool = False) -> States:
         if all(each in measures for each in names):
             text = re.sub(r"\{(\w+)\}", lambda found: str(measures[found[1]]), entry["formula"])
             formulas[name] = parse(text, longest=LONG)
-    return States(scenario, frozenset(facts), formulas, on_map)
+    more = {"unread": "the roads of a map are not read"} if on_map else {}
+    return States(scenario, frozenset(facts), formulas, others, on_map, **more)
+
+
+def facts_of_types(others: Iterable[tuple[Iterable[str], str]]) -> set[str]:
+    """Return which participants there are; see `States.others`."""
+    found = {f"participant:{kind_of(name)}" for types, _ in others for name in types}
+    return found - {"participant:other"}  # an obstacle
 
 
 def kind_of(name: str) -> str:

@@ -39,7 +39,6 @@ OPPOSITE = 45.0
 """Largest deviation from a straight line of the directions of legs that are opposite [deg];
 ours."""
 
-_KINDS = {"roundabout": "Roundabout", "merge": "Merge"}
 _BY_LEGS = {3: "TJunction", 4: "Crossroads"}
 _WAYS: tuple[Direction, ...] = ("in", "out")
 

@@ -17,7 +17,7 @@ from bridgegen.assess.conflict.types import Rule
 from bridgegen.base.arrays import Bool, Float, Int, Numbers
 from bridgegen.base.statistics import clopper_pearson
 from bridgegen.base.units import percent
-from bridgegen.search.triage.record import NOT_JUDGED, Bound, Drawn, Estimate, Least, Verdict
+from bridgegen.search.triage.record import NOT_JUDGED, Bound, Drawn, Estimate, Least, Met, Verdict
 
 Avoids = Callable[[Int], Bool]
 """Function that says of rows ``(K,)`` whether a careful driver has no collision in them, ``(J,)``,
@@ -42,14 +42,14 @@ _MARGIN = {
 }
 
 
-def estimate(drawn: Drawn, harmful: int, rows: int, *, met: bool = False) -> Estimate:
+def estimate(drawn: Drawn, harmful: int, rows: int, *, met: Met = False) -> Estimate:
     """Estimate a share of the space from independent rows, with its exact interval.
 
     Args:
         drawn: the source of the rows; "" if there are none.
         harmful: number of harmful rows.
         rows: number of rows with a result.
-        met: whether parameters were drawn as often as their priors say.
+        met: see `Estimate`.
 
     Source: C. Clopper and E. Pearson, Biometrika 26 (1934); 95 %, two-sided.
     """

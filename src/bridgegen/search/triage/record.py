@@ -52,6 +52,9 @@ makes most of the harm vanish, so that no fix can be credited; "not known": too 
 a result with some fix; "" where none was tried."""
 
 
+Met = bool | Literal["within"]
+
+
 class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -66,7 +69,8 @@ class Estimate(_Model):
         share: harmful / rows; None where there are no rows.
         low: lower end of the two-sided 95 % Clopper-Pearson interval.
         high: its upper end, also where no row is harmful: a one-sided 97.5 % upper bound.
-        met: whether parameters were drawn as often as their priors say; else all evenly.
+        met: whether parameters were drawn as often as their priors say, or in a part of what these
+            span ("within"); else all evenly.
     """
 
     drawn: Drawn
@@ -75,12 +79,15 @@ class Estimate(_Model):
     share: Share | None
     low: Share
     high: Share
-    met: bool = False
+    met: Met = False
 
     @property
     def measure(self) -> str:
         """By which measure of the space, in words."""
-        return "weather as it is met, all else uniform" if self.met else "uniform over the ranges"
+        if not self.met:
+            return "uniform over the ranges"
+        within = " within its ranges" if self.met == "within" else ""
+        return f"weather as it is met{within}, all else uniform"
 
 
 class FreshRows(_Model):

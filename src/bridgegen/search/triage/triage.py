@@ -19,6 +19,7 @@ from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.trials import EVENT
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.scenario.language.prior import surprise
+from bridgegen.scenario.odd.bounding import OddBound
 from bridgegen.search.triage.bound import (
     CONTACT,
     UNBIASED,
@@ -51,6 +52,7 @@ from bridgegen.search.triage.record import (
     Drawn,
     Estimate,
     FreshRows,
+    Met,
     Minimal,
     Mode,
     Neighbourhood,
@@ -372,8 +374,10 @@ class _Triage:
     def _shares(self, groups: Sequence[Group]) -> tuple[Estimate, list[Estimate], FreshRows | None]:
         """Return the harmful share of the space, that of each mode, and the fresh rows drawn."""
         rows = self._rows
-        priors = [self._space.parameters[name].prior for name in self._space.variables]
-        drawn_of = partial(estimate, met=any(priors))
+        met: Met = any(self._space.parameters[name].prior for name in self._space.variables)
+        if met and _is_narrowed(self._pipeline):
+            met = "within"
+        drawn_of = partial(estimate, met=met)
         fit = int(((rows.status == 0) & ~_implausible(rows)).sum())
         # Only rows that were drawn without regard to results estimate a share. Of a particle
         # swarm's leaves that are 80 to 100 % critical, 2 to 98 % of random scenarios are.
@@ -551,6 +555,21 @@ def _baseline_fails(pipeline: Pipeline, rows: Rows | Recorded) -> Bool:
 def _is_copy(events: Float, i: int, others: Sequence[int]) -> bool:
     """Return whether the same happened in a row as in one of some others."""
     return bool((apart(events[list(others)], events[i]) < COPY).any())
+
+
+def _is_narrowed(pipeline: Pipeline) -> bool:
+    """Return whether a parameter is searched in a part of what its prior spans."""
+    space, priors = pipeline.space, set()
+    for name, parameter in space.parameters.items():
+        if prior := parameter.prior:
+            priors.add(name)
+            if name in space.fixed or (parameter.low, parameter.high) != (prior.low, prior.high):
+                return True
+    constant = any(not rule.names for name in priors for rule in space.bounds[name])
+    return constant or any(
+        isinstance(rule, OddBound) and priors & {rule.target, *rule.names}
+        for rule in (*space.constraints.bounds, *pipeline.scenario.checks)
+    )
 
 
 def _implausible(rows: Rows | Recorded) -> Bool:

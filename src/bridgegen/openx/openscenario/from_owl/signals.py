@@ -100,21 +100,24 @@ class Signals:
             first = (first + 1) % len(phases)
         if offset > 0.0:
             self.offsets[name] = offset
-        # The standard's cycle begins with its first phase: the one that runs at time 0.
-        order = [*range(first, len(phases)), *range(first)]
+        # The standard's cycle begins with its first phase, in full: with what is left of the one
+        # that runs at time 0, whose passed part ends the cycle.
+        parts = [(k, durations[k]) for k in (*range(first, len(phases)), *range(first))]
+        if offset > 0.0:
+            parts = [(first, durations[first] - offset), *parts[1:], (first, offset)]
         self.controllers.append(
             osc.TrafficSignalController(
                 name,
                 tuple(
                     osc.Phase(
                         ind.text(phases[k], "has_name"),
-                        durations[k],
+                        lasts,
                         tuple(
                             osc.TrafficSignalState(light, LAMPS[state])
                             for light, state in sorted(shown[k].items())
                         ),
                     )
-                    for k in order
+                    for k, lasts in parts
                 ),
             )
         )

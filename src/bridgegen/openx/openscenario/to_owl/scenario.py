@@ -111,26 +111,28 @@ def _add_controller(
     offset = as_number(builder, passed[0].value, passed[0]) if passed else 0.0
     if not controller.phases:
         raise NotExpressibleError(controller, f"the TrafficSignalController {name} without a Phase")
+    parts = [(phase, builder.now(phase.duration, phase)) for phase in controller.phases]
+    (first, lasts), (last, ended) = parts[0], parts[-1]
+    # The phase that runs at time 0 is in two parts; files of earlier versions have it whole.
+    if 0.0 < offset == ended and builder.text(first.name) == builder.text(last.name):
+        parts = [(first, lasts + offset), *parts[1:-1]]
     shown = [
         {builder.text(state.traffic_signal_id): state for state in phase.traffic_signal_states}
-        for phase in controller.phases
+        for phase, _ in parts
     ]
     lights = set(shown[0])
     for light in sorted(lights):
         builder.put(node, "has_light", builder.light(light, shown[0][light]))
-    if passed is not None and not 0.0 <= offset < builder.now(
-        controller.phases[0].duration, controller
-    ):
+    if passed is not None and not 0.0 <= offset < parts[0][1]:
         raise NotExpressibleError(
             passed[0], f"an offset of {offset!r} s, not within the first Phase,"
         )
     builder.put(node, "has_offset", offset)
-    for number, (phase, states) in enumerate(zip(controller.phases, shown, strict=True), start=1):
+    for number, ((phase, duration), states) in enumerate(zip(parts, shown, strict=True), start=1):
         if set(states) != lights:
             raise NotExpressibleError(
                 phase, "a Phase that does not state every light of its controller"
             )
-        duration = builder.now(phase.duration, phase)
         if duration <= 0.0:
             raise NotExpressibleError(phase, f"a Phase of {duration!r} s")
         part = builder.node(f"{name}_phase_{number}", "SignalPhase")
