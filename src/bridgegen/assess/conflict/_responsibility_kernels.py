@@ -123,11 +123,13 @@ from bridgegen.assess.conflict._limits import (
     LATELY,
     LATERAL_MOVE,
     LATERAL_SEEN,
+    LOOKED_BACK,
     MARGIN,
     MARGIN_ON_FOOT,
     MOVES,
     OFF_LANE,
     SAME_WAY,
+    SLOWED,
     STANDS,
     STOOD,
     SYSTEM_BRAKING,
@@ -339,6 +341,9 @@ def decide(
                 whole[DECIDED] = min(max(mine, its), k)
             if mine >= 0 and its >= 0:
                 return SHARED, RED_LIGHT
+            # StVO § 1 (2), § 3 (2a): a green light is no licence to run into who is in sight.
+            if its >= 0 and IS_PEDESTRIAN[scene.kinds[e]] and avoidable:
+                return EGO, COULD_HAVE_STOPPED
             return (EGO if mine >= 0 else OTHER), RED_LIGHT
     if kind in (VRU_BY_FRONT, VRU_INTO_SIDE):
         return of_vulnerable(scene, e, k, kind, own, since, avoidable, whole)
@@ -694,9 +699,11 @@ def of_crossing(scene, e, k, own, risk, seen, avoidable, whole):
         return of_siren(scene, e, k, whole)
     if claim < 0 and not avoidable and not front and has_set_off(scene, e, k):
         return NEITHER, REVEALED_LATE  # struck as it had all but passed, by one that had waited
-    if claim != 0:
-        return (OTHER if claim > 0 else EGO), rule_of(claim)
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
+    if claim != 0:
+        if claim < 0 and not its and misleads(scene, e, k):
+            return SHARED, rule_of(claim)
+        return (OTHER if claim > 0 else EGO), rule_of(claim)
     if same_road(scene, e, k):
         if mine != its:
             return (EGO if mine else OTHER), TURNING_GIVES_WAY
@@ -706,6 +713,21 @@ def of_crossing(scene, e, k, own, risk, seen, avoidable, whole):
     j = max(k - int(TURN_TIME / scene.dt), scene.first)
     from_right = scene.c[0, j] * scene.s[e, j] - scene.s[0, j] * scene.c[e, j] > 0.0
     return (EGO if from_right else OTHER), ASSUMED_RIGHT_BEFORE_LEFT
+
+
+@kernel
+def misleads(scene, e, k):
+    """Return whether body e, which does not turn, let the ego believe before k that it would.
+
+    Source: Oberlandesgericht Dresden, 24 April 2014, 7 U 1501/13: an indicator alone is no reason
+    to trust that one with priority turns off; together with slowing down clearly it is.
+    """
+    fastest, trusted = 0.0, False
+    for i in range(max(k - int(LOOKED_BACK / scene.dt), scene.first), k + 1):
+        if shows(scene, e, i, LEFT) or shows(scene, e, i, RIGHT):
+            fastest = max(fastest, scene.v[e, i])
+            trusted = trusted or scene.v[e, i] <= SLOWED * fastest
+    return trusted
 
 
 @kernel

@@ -127,7 +127,7 @@ class ParticipantSection(ShapedSection):
     siren: Annotated[bool, Field(strict=True)] = False
     """Whether an emergency vehicle has its blue light and siren on, so that all give way to it."""
     driver: Word | None = None
-    """Driver: attentive, insistent or scripted, instead of ``others``; not of the ego."""
+    """Driver: attentive, insistent, lawful or scripted, instead of ``others``; not of the ego."""
 
 
 class ConditionSection(ShapedSection):
