@@ -66,6 +66,7 @@ from bridgegen.assess.conflict._codes import (
     NEITHER,
     NO_PRIORITY,
     OBJECT,
+    OPENED,
     OTHER,
     PASSED_TOO_CLOSE,
     PREVENTABLE,
@@ -145,6 +146,7 @@ from bridgegen.drivers.kinds import (
     HAZARD,
     IS_ANIMAL,
     IS_CYCLE,
+    IS_OBSTACLE,
     IS_PEDESTRIAN,
     IS_VULNERABLE,
     LEFT,
@@ -164,6 +166,10 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     # A risk only once the ego could see it: a driver does not brake for what it cannot know.
     entry, side, early = entered(scene, 0, e, k, MARGIN_ON_FOOT if on_foot else MARGIN)
     risk, early = visible_from(scene, e, entry, early, k)
+    # A door beside the ego's way is no danger while it is closed.
+    opens = opened_since(scene, e, k) if IS_OBSTACLE[scene.kinds[e]] else -1
+    if opens > risk:
+        risk, early = opens, 0.0
     since, stands = risk, still_since(scene.v[e], scene.first, k)
     # A moving participant was once a risk as soon as it was on the ego's strip: `un-r157`, the
     # regulation's own driver, had 271 critical rows of 1,000 in cut-in, each said to be avoidable
@@ -220,6 +226,15 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
             real,
         )
     real[LEFT_TO_ACT] = max(at - whole[DECIDED], 0) * scene.dt + real[TTC]
+
+
+@kernel
+def opened_since(scene, e, k):
+    """Return the last instant up to k at which body e began to move, or came moving; -1: none."""
+    for i in range(k, scene.first, -1):
+        if scene.v[e, i] > 0.0 and scene.v[e, i - 1] <= 0.0:
+            return i - 1
+    return scene.first if scene.first > 0 and scene.v[e, scene.first] > 0.0 else -1
 
 
 @kernel
@@ -349,6 +364,8 @@ def decide(
         return of_vulnerable(scene, e, k, kind, own, since, avoidable, whole)
     if kind == REAR_END_STRUCK:
         return of_struck(scene, e, k, whole)
+    if kind == OBJECT and opened_since(scene, e, k) >= 0:
+        return (EGO, STANDING_AHEAD) if avoidable else (OTHER, OPENED)
     if kind == OBJECT and scene.v[e, k] > STANDS and not strikes_with_front(own, own_part):
         return OTHER, LEFT_ITS_LANE
     if kind in (REAR_END_STRIKING, OBJECT):

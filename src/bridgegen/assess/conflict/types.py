@@ -155,6 +155,7 @@ class Rule(IntEnum):
     CUT_IN_REQUIRED = _codes.CUT_IN_REQUIRED
     REVERSED = _codes.REVERSED
     NO_PRIORITY = _codes.NO_PRIORITY
+    OPENED = _codes.OPENED
 
     @property
     def label(self) -> str:
@@ -277,6 +278,10 @@ RULES = {
     Rule.NO_PRIORITY: (
         "drove on where nobody has priority by law",
         COUNTRIES["UK"].source,
+    ),
+    Rule.OPENED: (
+        "opened into the path when stopping was no longer possible",
+        "StVO § 14 (1); Vienna Convention, Art. 24",
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",
