@@ -64,7 +64,7 @@ DOOR = Body(1.1, 0.06, 1.1, center_ahead=-0.55, max_speed=1.0, mass=30.0)
 HINGE_BEHIND = 1.3
 """Distance from a vehicle's front to the hinges of its front doors [m]; ours."""
 
-DOOR_GAP, DOOR_BEND, DOOR_ANGLE = 0.1, 0.08, math.radians(70.0)
+DOOR_GAP, DOOR_BEND, DOOR_ANGLE = 0.06, 0.02, math.radians(70.0)
 """Distance from a vehicle's side to the hinge [m], and the bend that its door's hinge goes round, of
 two straight lines of that length [m], so that the door turns by that angle [rad]; ours. A door that
 turns on the spot would have no path."""
