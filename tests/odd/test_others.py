@@ -30,7 +30,7 @@ CARELESS = {
 INSISTENT = {
     "red-light-runner": ["runner"], "emergency-vehicle-on-red": ["ambulance"],
     "stop-sign-runner": ["runner"], "oncoming-left-at-signals": ["turner"],
-    "right-turn-on-red": ["turner"],
+    "right-turn-on-red": ["turner"], "crosses-on-red": ["walker"],
     **{name: ["bv"] for name in PAPERS},
 }  # fmt: skip
 """Who gives way to none, likewise, and stops for what stands in its way."""
