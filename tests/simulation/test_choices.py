@@ -102,7 +102,7 @@ def test_a_door_comes_out_of_the_side_and_turns_within_its_time(moved):
     assert NAMES[rollout.kinds[door]] == "other"
     (there,) = np.nonzero(rollout.present[0, door])
     first, turned = there[0], rollout.h[0, door]
-    assert 0 < first
+    assert first > 0
     assert rollout.present[0, door, first:].all()
     assert turned[first] == pytest.approx(0.0, abs=0.02)
     assert turned[first + 21] == pytest.approx(-np.radians(70.0), abs=0.03)

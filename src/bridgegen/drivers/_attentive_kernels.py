@@ -72,7 +72,6 @@ from bridgegen.drivers.kinds import (
     HAZARD,
     IS_ON_FOOT,
     IS_PEDESTRIAN,
-    IS_VEHICLE,
     NEEDS_ROOM,
     USES_LANES,
 )
@@ -252,16 +251,16 @@ def wait_at_kerb(
 
 @kernel
 def look(
-    e, pace, stop, grip, rules, paths, path_n, path_ds, station, on, aside, target, present, seen, far,
-    bodies, kinds, meets, zones, claims, stops, halts, lights, mind,
+    e, pace, stop, grip, rules, paths, path_n, path_ds, station, on, aside, target, present, seen,
+    far, bodies, kinds, meets, zones, claims, stops, halts, lights, mind,
 ):  # fmt: skip
     """Return the acceleration [m/s²] that participant e's surroundings require; +inf: none.
 
     It would go at ``pace`` [m/s] and must stop before station ``stop`` of its path anyway (+inf:
     nowhere). ``rules``: 0 it is no vehicle and heeds none; 1 those of traffic on lanes; 2 those of
-    one off the lanes. Of all participants: the path that each is ``on`` (a row of ``paths``, ``path_n`` and
-    ``path_ds``), its ``station`` there, how far it is ``aside`` of it, and will be (``target``)
-    [m]; whether it is ``present``; what is ``seen`` of it; ``bodies`` ``(E, ·)`` and ``kinds``.
+    one off the lanes. Of all participants: the path that each is ``on`` (a row of ``paths``,
+    ``path_n`` and ``path_ds``), its ``station`` there, how far it is ``aside`` of it, and will
+    be (``target``) [m]; whether it is ``present``; what is ``seen`` of it; ``bodies`` ``(E, ·)`` and ``kinds``.
     ``far`` ``(E,)`` is scratch space. ``zones`` ``(E, ZONE)`` is where its first path meets the
     others' first ones, if it ``meets`` any, ``claims`` ``(E,)`` > 0 where the other waits, < 0
     where it does (``right_of_way.claim``); ``stops`` and ``halts`` are the stations of lights and

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bridgegen.base.arrays import Bool, Float
 from bridgegen.base import elementary
+from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.adversary import DRIVERS, LOOKING
 from bridgegen.scenario.language.choices import Choices
@@ -65,9 +65,9 @@ HINGE_BEHIND = 1.3
 """Distance from a vehicle's front to the hinges of its front doors [m]; ours."""
 
 DOOR_GAP, DOOR_BEND, DOOR_ANGLE = 0.06, 0.02, math.radians(70.0)
-"""Distance from a vehicle's side to the hinge [m], and the bend that its door's hinge goes round, of
-two straight lines of that length [m], so that the door turns by that angle [rad]; ours. A door that
-turns on the spot would have no path."""
+"""Distance from a vehicle's side to the hinge [m]; and the bend that the hinge goes round, of two
+straight lines of that length [m], so that the door turns by that angle [rad]; ours. A door that
+turned on the spot would have no path, and a body faster than 0.1 m/s is none that stands."""
 
 DOOR_WAY = 0.8819 * 2.0 * DOOR_BEND
 """Length of the curve of a door's hinge round that bend [m]."""
@@ -290,7 +290,12 @@ class Storyboard:
             if given is None or given.door is None:
                 continue
             of = vehicles.get(str(given.participant))
-            if of is None or of.conduct != "vehicle" or of.name == EGO or PARTICIPANTS[of.type].on_rails:
+            if (
+                of is None
+                or of.conduct != "vehicle"
+                or of.name == EGO
+                or PARTICIPANTS[of.type].on_rails
+            ):
                 self._report(f"{key}: a door is of a vehicle other than the ego", (*path, "door"))
             elif of.path or of.heading or of.place_by or of.type_by or self._drives(of):
                 what = "stands along its lane, at one place and of one type"
@@ -325,14 +330,17 @@ class Storyboard:
                 ("at", of.start.distance, forward * (ahead + along)),
                 ("offset", of.start.offset, aside + across),
             ):
-                if isinstance(start, str) and start in self._quantities.declared:
-                    values.append(f"{name}_{label}_{number}")
-                    text = parse(f"{start} + ({by!r})", place)
+                if not isinstance(start, str):
+                    values.append(by + start)
+                elif start in self._quantities.declared:
+                    key, text = f"{name}_{label}_{number}", parse(f"{start} + ({by!r})", place)
                     why, said = "It is hinged to its vehicle.", f"Where the hinge of {name} is."
-                    made = Derived(values[-1], Axis.PARTICIPANTS, "m", text, why, "ours", said, place)  # type: ignore[arg-type]
-                    self.derived.append(made)
+                    self.derived.append(
+                        Derived(key, Axis.PARTICIPANTS, "m", text, why, "ours", said, place)
+                    )
+                    values.append(key)
                 else:
-                    values.append(by + (0.0 if isinstance(start, str) else start))
+                    values.append(by)  # an unknown name is reported already
             points.append(replace(of.start, distance=values[0], offset=values[1]))
         return Participant(name, "obstacle", points[0], None, 0.0, tuple(points), own_body=DOOR)
 
