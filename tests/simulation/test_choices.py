@@ -5,10 +5,13 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from tests.approval import refuses
+from tests.simulation.embedded.test_language import there_and_back
 
 import bridgegen as bg
 from bridgegen.base.errors import ScenarioError
 from bridgegen.drivers.kinds import NAMES
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 RED, YELLOW, GREEN = 1, 3, 4
 KERB_EAST = 3.5  # m east of the leg's middle: one lane
@@ -115,6 +118,11 @@ def test_a_door_comes_out_of_the_side_and_turns_within_its_time(moved):
     assert (found.conflict.responsible, found.conflict.rule) == ("ego", "standing ahead")
     late = moved("door-opens", opens_at=12.0).conflict
     assert (late.responsible, late.rule) == ("other", "opened")
+
+
+def test_the_files_say_a_door_there_and_back():
+    scenario = load("door-opens")
+    there_and_back(Pipeline(scenario, scenario.space()))
 
 
 @pytest.mark.parametrize(

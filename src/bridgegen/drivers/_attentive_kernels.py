@@ -260,7 +260,8 @@ def look(
     nowhere). ``rules``: 0 it is no vehicle and heeds none; 1 those of traffic on lanes; 2 those of
     one off the lanes. Of all participants: the path that each is ``on`` (a row of ``paths``,
     ``path_n`` and ``path_ds``), its ``station`` there, how far it is ``aside`` of it, and will
-    be (``target``) [m]; whether it is ``present``; what is ``seen`` of it; ``bodies`` ``(E, ·)`` and ``kinds``.
+    be (``target``) [m]; whether it is ``present``;
+    what is ``seen`` of it; ``bodies`` ``(E, ·)`` and ``kinds``.
     ``far`` ``(E,)`` is scratch space. ``zones`` ``(E, ZONE)`` is where its first path meets the
     others' first ones, if it ``meets`` any, ``claims`` ``(E,)`` > 0 where the other waits, < 0
     where it does (``right_of_way.claim``); ``stops`` and ``halts`` are the stations of lights and

@@ -102,17 +102,17 @@ def add_participant(
     start = add_position(builder, f"{name}_start", participant.start, site)
     if participant.heading != 0.0:
         builder.quantity(start, "has_relative_heading", participant.heading)
-    if participant.is_door:  # the event in which it opens takes both
+    if participant.is_door:  # the event in which it opens takes its place and its path
         _add_trajectory(builder, participant, start, site)
-        return node
-    teleport = builder.node(f"{name}_teleport", "TeleportAction")
-    put(teleport, "has_position", start)
-    put(node, "has_init_action", teleport)
-    if participant.conduct != "obstacle":
+    else:
+        teleport = builder.node(f"{name}_teleport", "TeleportAction")
+        put(teleport, "has_position", start)
+        put(node, "has_init_action", teleport)
+    if participant.conduct != "obstacle" or participant.is_door:
         speed = builder.node(f"{name}_init_speed", "SpeedAction")
         builder.quantity(speed, "has_target_speed", participant.speed)
         put(node, "has_init_action", speed)
-    if participant.path:
+    if participant.path and not participant.is_door:
         put(node, "has_init_action", _add_trajectory(builder, participant, start, site))
     if participant.end is not None:
         route = builder.node(f"{name}_route", "Route")

@@ -151,9 +151,7 @@ class _Converter:
         for action in self.individuals.links(self.node, "has_global_action"):
             globals_.append(self.actions.scenario_wide(action))
         privates = [
-            osc.Private(name, actions)
-            for name, node in self.participants.items()
-            if (actions := self._start(name, node))  # none of one that comes later
+            osc.Private(name, self._start(name, node)) for name, node in self.participants.items()
         ]
         for name, node in elements.items():
             place = self.individuals.link(node, "has_position")

@@ -320,8 +320,9 @@ def heed(k, plan, roads, state, record):
             mind[ASKED] = look(
                 e, state.command[e], stop, state.weather[FRICTION], rules, roads.paths,
                 roads.counts, roads.steps, state.station, state.on, state.aside, target,
-                state.minded, state.seen, state.far, plan.bodies, plan.kinds, roads.meets[e], roads.meetings[e],
-                roads.claims[e], roads.lines[e], roads.signs[e], state.lights, mind,
+                state.minded, state.seen, state.far, plan.bodies, plan.kinds, roads.meets[e],
+                roads.meetings[e], roads.claims[e], roads.lines[e], roads.signs[e], state.lights,
+                mind,
             )  # fmt: skip
         state.allowed[e] = react(k, plan.dt, mind[ASKED], mind)
 
