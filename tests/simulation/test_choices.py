@@ -95,7 +95,7 @@ def test_a_lawful_cyclist_gives_way_at_a_sign(moved):
 def test_one_that_indicates_slows_down_and_goes_on_shares_the_responsibility(moved):
     slow = moved("indicates-goes-straight", slow_speed=6.0, early=0.3).conflict
     fast = moved("indicates-goes-straight", slow_speed=13.5, early=0.3).conflict
-    assert (slow.conflict, slow.responsible, slow.rule) == ("contact", "shared", "signs")
+    assert (slow.conflict, slow.responsible, slow.rule) == ("contact", "shared", "misled")
     assert (fast.conflict, fast.responsible, fast.rule) == ("contact", "ego", "signs")
 
 

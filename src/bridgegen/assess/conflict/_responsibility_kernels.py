@@ -62,6 +62,7 @@ from bridgegen.assess.conflict._codes import (
     LEFT_ITS_LANE,
     LEFT_TO_ACT,
     MAP_PRIORITY,
+    MISLED,
     NEEDED,
     NEITHER,
     NO_PRIORITY,
@@ -719,7 +720,7 @@ def of_crossing(scene, e, k, own, risk, seen, avoidable, whole):
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
     if claim != 0:
         if claim < 0 and not its and misleads(scene, e, k):
-            return SHARED, rule_of(claim)
+            return SHARED, MISLED
         return (OTHER if claim > 0 else EGO), rule_of(claim)
     if same_road(scene, e, k):
         if mine != its:

@@ -156,6 +156,7 @@ class Rule(IntEnum):
     REVERSED = _codes.REVERSED
     NO_PRIORITY = _codes.NO_PRIORITY
     OPENED = _codes.OPENED
+    MISLED = _codes.MISLED
 
     @property
     def label(self) -> str:
@@ -278,6 +279,10 @@ RULES = {
     Rule.NO_PRIORITY: (
         "drove on where nobody has priority by law",
         COUNTRIES["UK"].source,
+    ),
+    Rule.MISLED: (
+        "did not give way to one that indicated a turn, slowed down and went straight on",
+        "StVO § 1 (2), § 8 (2); Oberlandesgericht Dresden, 24 April 2014, 7 U 1501/13",
     ),
     Rule.OPENED: (
         "opened into the path when stopping was no longer possible",
