@@ -30,7 +30,7 @@ CARELESS = {
 INSISTENT = {
     "red-light-runner": ["runner"], "emergency-vehicle-on-red": ["ambulance"],
     "stop-sign-runner": ["runner"], "oncoming-left-at-signals": ["turner"],
-    "right-turn-on-red": ["turner"],
+    "right-turn-on-red": ["turner"], "crosses-on-red": ["walker"],
     **{name: ["bv"] for name in PAPERS},
 }  # fmt: skip
 """Who gives way to none, likewise, and stops for what stands in its way."""
@@ -80,14 +80,14 @@ def test_a_participants_own_driver_goes_before_that_of_all(tmp_path):
         (
             "    speed: bv_speed\n",
             "    speed: bv_speed\n    driver: attentiv\n",
-            "the driver of bv must be one of attentive, insistent, scripted (others are for the "
-            "ego), got 'attentiv'; did you mean 'attentive'?",
+            "the driver of bv must be one of attentive, insistent, lawful, scripted (others are "
+            "for the ego), got 'attentiv'; did you mean 'attentive'?",
         ),
         (
             "    speed: bv_speed\n",
             "    speed: bv_speed\n    driver: reference\n",
-            "the driver of bv must be one of attentive, insistent, scripted (others are for the "
-            "ego), got 'reference'",
+            "the driver of bv must be one of attentive, insistent, lawful, scripted (others are "
+            "for the ego), got 'reference'",
         ),
         (
             "    speed: ego_speed\n",

@@ -13,7 +13,8 @@ A deceleration up to `EMERGENCY_FROM` is anticipated, and applied at once. A str
 emergency: the driver reacts `CAREFUL_REACTION` after it begins, and then brakes as hard as the
 careful driver of UN Regulation 157 until the danger is over.
 
-Participants on foot, animals and bicycles react only to what is ahead of them.
+Participants on foot, animals and bicycles react only to what is ahead of them; those who are
+lawful also to the rest. Off the lanes they wait at the kerb: see `wait_at_kerb`.
 
 A lane change is not begun into an occupied gap, see `gap_is_free`.
 
@@ -52,10 +53,28 @@ from bridgegen.drivers._following_kernels import (
     let_in,
     stop_for,
 )
-from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
+from bridgegen.drivers._lights_kernels import RED, stop_at_lights, stop_at_signs
 from bridgegen.drivers._path_kernels import COS, SIN, H, X, Y, locate, project
-from bridgegen.drivers._yielding_kernels import COMMITTED, HORIZON, give_way
-from bridgegen.drivers.kinds import HAZARD, IS_ON_FOOT, IS_PEDESTRIAN, IS_VEHICLE, NEEDS_ROOM
+from bridgegen.drivers._yielding_kernels import (
+    COMMITTED,
+    ENTER,
+    HORIZON,
+    LEAST_GAIN,
+    LEAVE,
+    MOST_GAIN,
+    OTHER_ENTERS,
+    OTHER_LEAVES,
+    STANDING,
+    coming,
+    give_way,
+)
+from bridgegen.drivers.kinds import (
+    HAZARD,
+    IS_ON_FOOT,
+    IS_PEDESTRIAN,
+    NEEDS_ROOM,
+    USES_LANES,
+)
 
 MIND = 8
 RISK, GIVEN, BRAKES, STOPS_FOR, HALTED, ASKED, STRAIGHT_TO, STRAIGHT_ON = range(MIND)
@@ -77,6 +96,10 @@ CONCERNS = 0.75 * COMFORT_ACCELERATION  # m/s²; a leader that allows more (its 
 STRAIGHT = 0.002  # rad; a path that turns by less is as good as straight: 0.1 m in 50 m
 STRAIGHT_STEP, STRAIGHT_REACH = 5.0, 400.0  # m, step and length of that test
 ON_FOOT_GAP = 0.5  # m, that a pedestrian keeps to what stands ahead
+START_UP = 3.0  # s, besides the time to cross, in the gap that one waits for; source: Highway
+# Capacity Manual 2010, eq. 19-69: critical headway = length / walking speed + start-up and end
+# clearance time, 3 s
+LEAST_WALK = 0.5  # m/s; who crosses is expected to be as fast at least
 LEAST_REACH = 3.0  # m besides bodies and gaps, for what comes in from the side
 CALM = 2.0 * math.sqrt(COMFORT_ACCELERATION * COMFORT_DECELERATION)  # m/s²
 
@@ -191,16 +214,54 @@ def keep_to_leaders(e, path, n, ds, p, s, v, right, left, present, seen, far, bo
 
 
 @kernel
+def wait_at_kerb(
+    e, s, pace, front, rear, station, on, present, seen, bodies, kinds, zones, kerbs, lines, lights
+):
+    """Return the station [m] of the kerb at which e, off the lanes at s, must wait; +inf: nowhere.
+
+    It waits while a light of ``lines`` lets the traffic go that it would cross; and at the kerbs
+    from which it has no priority, until each vehicle takes longer to its path than it takes itself
+    to be across that one's, at ``pace`` [m/s], and `START_UP`. For the rest see `look`.
+    """
+    stop = math.inf
+    for i in range(len(lines)):
+        if lights[i] > RED and s + front <= lines[i]:
+            stop = min(stop, lines[i])
+    here = beyond = math.inf  # the next two kerbs
+    for i in range(len(kerbs)):
+        if s + front <= kerbs[i]:
+            beyond = min(beyond, max(here, kerbs[i]))
+            here = min(here, kerbs[i])
+    if here >= stop:
+        return stop
+    for o in range(len(zones)):
+        zone, w = zones[o], seen[W, o]
+        if not here < zone[LEAVE] or not zone[ENTER] < beyond or not present[o] or on[o] != o:
+            continue
+        other_front = bodies[o, 2] + 0.5 * bodies[o, 0]
+        is_past = station[o] - (bodies[o, 0] - other_front) > zone[OTHER_LEAVES]
+        if not USES_LANES[kinds[o]] or w < STANDING or is_past:
+            continue
+        gain = min(seen[GAIN, o], MOST_GAIN) if seen[GAIN, o] > LEAST_GAIN else 0.0
+        needed = (zone[LEAVE] + rear - s) / max(pace, LEAST_WALK) + START_UP
+        if coming(zone[OTHER_ENTERS] - other_front - station[o], w, gain) < needed:
+            return here
+    return stop
+
+
+@kernel
 def look(
-    e, pace, stop, grip, paths, path_n, path_ds, station, on, aside, target, present, seen, far,
-    bodies, kinds, meets, zones, claims, stops, halts, lights, mind,
+    e, pace, stop, grip, rules, paths, path_n, path_ds, station, on, aside, target, present, seen,
+    far, bodies, kinds, meets, zones, claims, stops, halts, lights, mind,
 ):  # fmt: skip
     """Return the acceleration [m/s²] that participant e's surroundings require; +inf: none.
 
     It would go at ``pace`` [m/s] and must stop before station ``stop`` of its path anyway (+inf:
-    nowhere). Of all participants: the path that each is ``on`` (a row of ``paths``, ``path_n`` and
-    ``path_ds``), its ``station`` there, how far it is ``aside`` of it, and will be (``target``)
-    [m]; whether it is ``present``; what is ``seen`` of it; ``bodies`` ``(E, ·)`` and ``kinds``.
+    nowhere). ``rules``: 0 it is no vehicle and heeds none; 1 those of traffic on lanes; 2 those of
+    one off the lanes. Of all participants: the path that each is ``on`` (a row of ``paths``,
+    ``path_n`` and ``path_ds``), its ``station`` there, how far it is ``aside`` of it, and will
+    be (``target``) [m]; whether it is ``present``;
+    what is ``seen`` of it; ``bodies`` ``(E, ·)`` and ``kinds``.
     ``far`` ``(E,)`` is scratch space. ``zones`` ``(E, ZONE)`` is where its first path meets the
     others' first ones, if it ``meets`` any, ``claims`` ``(E,)`` > 0 where the other waits, < 0
     where it does (``right_of_way.claim``); ``stops`` and ``halts`` are the stations of lights and
@@ -213,10 +274,19 @@ def look(
         e, path, n, ds, p, s, v, min(aside[e], target), max(aside[e], target), present, seen, far,
         bodies, kinds, mind,
     )  # fmt: skip
-    if not IS_VEHICLE[kinds[e]]:
+    if rules == 0:
+        return asked
+    rear = bodies[e, 0] - front
+    if rules == 2:
+        if p == e:
+            stop = wait_at_kerb(
+                e, s, pace, front, rear, station, on, present, seen, bodies, kinds, zones, halts,
+                stops, lights,
+            )  # fmt: skip
+            if stop < math.inf:
+                asked = min(asked, stop_for(stop - front - s + STOP_MARGIN - ON_FOOT_GAP, v))
         return asked
     if p == e:
-        rear = bodies[e, 0] - front
         for o in range(len(zones) if meets else 0):
             zone = zones[o]
             if zone[0] == math.inf or not present[o] or on[o] != o:

@@ -48,10 +48,15 @@ TIME_LIMIT = 10.0
 """Default time limit of one call of a user's driver [s]."""
 
 
-SCRIPTED, ATTENTIVE, INSISTENT = 0, 1, 2
+SCRIPTED, ATTENTIVE, INSISTENT, LAWFUL = 0, 1, 2, 3
 """Codes of the drivers of participants other than the ego."""
 
-CODES = {"scripted": SCRIPTED, "attentive": ATTENTIVE, "insistent": INSISTENT}
+CODES = {
+    "scripted": SCRIPTED,
+    "attentive": ATTENTIVE,
+    "insistent": INSISTENT,
+    "lawful": LAWFUL,
+}
 """Codes of the drivers of participants other than the ego, by name."""
 
 OTHERS = {
@@ -60,6 +65,8 @@ OTHERS = {
     "gap to change lane.",
     "insistent": "As attentive to what is ahead and stands in its way; gives way to none "
     "that crosses, and passes red lights and stop signs.",
+    "lawful": "As attentive; on foot and on a cycle, too, it waits at red lights, gives way, and "
+    "enters the road away from crosswalks only where the gap in the traffic is long enough.",
     "scripted": "Does what its script says, whatever happens.",
 }
 """The drivers of participants other than the ego: name and description."""

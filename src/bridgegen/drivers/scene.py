@@ -15,13 +15,16 @@ import numpy.typing as npt
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.drivers.right_of_way import (
+    AT_JUNCTION,
     NO_RULE,
     STOP_SIGN,
     WE_WAIT,
     claims,
     crossings,
+    inner,
     right_of_way,
 )
+from bridgegen.openx.opendrive.geometry import reference_line
 from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
 from bridgegen.openx.opendrive.legs import governs, signals_on
 from bridgegen.openx.opendrive.model import SPEED_UNITS, OpenDrive, Road
@@ -46,6 +49,9 @@ SAMPLE = 0.5
 """Approximate distance between two samples of a way [m]."""
 
 STOP_LINE = "stopline"
+
+KERB_REACH = 1.0
+"""Maximum distance between a kerb and where its crosswalk begins [m]; ours."""
 
 
 class Scene(NamedTuple):
@@ -308,6 +314,75 @@ def crosswalks(model: OpenDrive, path: Float, step: float) -> Float:
                 (inside[0] * step, inside[-1] * step, float(left.min()), float(left.max()))
             )
     return np.array(sorted(found)).reshape(len(found), 4)
+
+
+class Kerb(NamedTuple):
+    """Where a path off the lanes comes onto the lanes of a road.
+
+    Attributes:
+        station: on the path [m].
+        crossing: whether a crosswalk begins there.
+        lights: the lights for the traffic over that crosswalk; who crosses has red while one of
+            them is not red.
+    """
+
+    station: float
+    crossing: bool
+    lights: tuple[str, ...]
+
+
+def kerbs(model: OpenDrive, path: Float, step: float, lights: Sequence[str]) -> list[Kerb]:
+    """Return the kerbs that a path crosses from outside the road, in its order.
+
+    Args:
+        model: the road network.
+        path: ``(n, ≥2)``: x, y [m].
+        step: between two rows [m].
+        lights: ids of the traffic lights that change.
+    """
+    points = path[:, :2]
+    on_lanes = np.zeros(len(points), np.bool_)
+    walks: list[tuple[Bool, tuple[str, ...]]] = []
+    for road in model.roads:
+        on_lanes |= _on_lanes(road, points)
+        for obj in road.objects:
+            corners = outline_of(road, obj) if (obj.type or "").lower() == "crosswalk" else None
+            if corners is not None and len(corners) >= 3:
+                near = (item for item in signals_on(road) if abs(item.s - obj.s) <= AT_JUNCTION)
+                ids = tuple(dict.fromkeys(item.id for item in near if item.id in lights))
+                walks.append((_inside(points, corners), ids))
+    found: list[Kerb] = []
+    for i in (np.flatnonzero(on_lanes[1:] & ~on_lanes[:-1]) + 1).tolist():
+        at = slice(max(i - math.ceil(KERB_REACH / step), 0), i + math.ceil(KERB_REACH / step) + 1)
+        here = [ids for inside, ids in walks if inside[at].any()]
+        all_lights = tuple(dict.fromkeys(light for ids in here for light in ids))
+        found.append(Kerb((i - 1) * step, bool(here), all_lights))
+    return found
+
+
+def _on_lanes(road: Road, points: Float) -> Bool:
+    """Return which points ``(P, 2)`` are on lanes of a road that traffic drives on, ``(P,)``."""
+    found = np.zeros(len(points), np.bool_)
+    stations = np.linspace(0.0, road.length, math.ceil(road.length / SAMPLE) + 1)
+    line = reference_line(road, stations)
+    for i, (x, y) in enumerate(points.tolist()):
+        dx, dy = x - line.x, y - line.y
+        j = int(np.argmin(dx * dx + dy * dy))
+        c, s = elementary.cos(line.h[j]), elementary.sin(line.h[j])
+        at = stations[j] + dx[j] * c + dy[j] * s
+        if not 0.0 <= at <= road.length:
+            continue
+        t = dy[j] * c - dx[j] * s
+        number = section_index(road, float(at))
+        border = {lane: float(edge[0]) for lane, edge in borders(road, number, at[None]).items()}
+        section = road.sections[number]
+        found[i] = any(
+            min(border[lane.id], border[inner(lane.id)]) <= t
+            and t <= max(border[lane.id], border[inner(lane.id)])
+            for lane in (*section.left, *section.right)
+            if lane.drivable
+        )
+    return found
 
 
 def ways_from(model: OpenDrive, start: Stretch, s: float) -> list[Route]:

@@ -109,8 +109,8 @@ def simulate_file(
             with another ``ego``.
         vehicle: how the ego moves, see `bridgegen.simulation.vehicles`; what the file says by
             default, or kinematically.
-        others: "attentive", "insistent" or "scripted": who drives the other participants; what
-            their controllers say by default.
+        others: "attentive", "insistent", "lawful" or "scripted": who drives the other participants;
+            what their controllers say by default.
         empty_trigger: when acts and events start whose StartTrigger is empty: "never", or "now".
         time_limit: [s] that one call of a user's own driver may take.
         metrics: names; all that the driver gives rise to by default.

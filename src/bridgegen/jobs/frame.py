@@ -130,8 +130,8 @@ class DriveOptions(Declared):
         default=None,
         metadata=option(
             ANY,
-            "Driver of all other participants: attentive, insistent (gives way to none), or "
-            "scripted (they react to nothing).",
+            "Driver of all other participants: attentive, lawful (so are people on foot and on "
+            "cycles), insistent (gives way to none), or scripted (they react to nothing).",
             shown="what the scenario says",
             group=DRIVER,
             names="others",

@@ -102,7 +102,9 @@ class Rollout:
             ``(0, 0, 0, 8)`` where a scenario states none.
         stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where a route
             crosses the stop line of a traffic light, the heading in travel direction.
-        stop_lights: ``(L,)`` int64, each stop line's light, an index into ``light_names``.
+        stop_lights: ``(L,)`` int64, each stop line's light, an index into ``light_names``; of the
+            kerb of a crosswalk ~index of the light for the traffic that goes over it: who crosses
+            there has red unless that light is red or off.
         stop_entities: ``(L,)`` int64, whose route it is.
         claims: ``(N, E, E)`` int64, which of two participants' routes goes first; see
             `bridgegen.drivers.right_of_way.claim`. ``(0, 0, 0)`` where no map is known.

@@ -39,6 +39,16 @@ RED, RED_AND_YELLOW = 1, 2
 
 
 @kernel
+def is_red(scene, j, k):
+    """Return whether stop line j must not be passed at instant k; see `Rollout.stop_lights`."""
+    light = scene.stop_lights[j]
+    if light < 0:  # a crosswalk's kerb: its own light is not on the map, so the traffic's counts
+        return scene.lights[~light, k] > RED
+    state = scene.lights[light, k]
+    return state in (RED, RED_AND_YELLOW)
+
+
+@kernel
 def passes_line(scene, e, j, since, last):
     """Return at which instants body e passes stop line j: the last at red, and the last; -1: none.
 
@@ -53,8 +63,7 @@ def passes_line(scene, e, j, since, last):
         past = px * lc + py * ls
         if before <= 0.0 < past and abs(py * lc - px * ls) <= LINE_REACH:
             at_all = i
-            state = scene.lights[scene.stop_lights[j], i - 1]
-            if state in (RED, RED_AND_YELLOW):
+            if is_red(scene, j, i - 1):
                 at_red = i
         before = past
     return at_red, at_all
@@ -90,9 +99,8 @@ def stops_at_red(scene, e, k, time):
         lc, ls = elementary.cos(line[2]), elementary.sin(line[2])
         px = scene.x[e, k] + scene.half[e, 0] * scene.c[e, k] - line[0]
         py = scene.y[e, k] + scene.half[e, 0] * scene.s[e, k] - line[1]
-        state = scene.lights[scene.stop_lights[j], k]
         before = -SIGHT <= px * lc + py * ls <= 0.0 and abs(py * lc - px * ls) <= LINE_REACH
-        if before and (state in (RED, RED_AND_YELLOW)):
+        if before and is_red(scene, j, k):
             _, passes = passes_line(scene, e, j, k, ahead_until(scene, k, time))
             if passes < 0:
                 return True

@@ -171,10 +171,13 @@ farther aside it crosses another lane's. Ours: a lane's width."""
 SIGHT = 60.0
 """Largest distance before its stop line at which a light holds a body [m]. Ours."""
 LOOKED_BACK = 10.0
-"""Time before a conflict in which running a red light counts [s]. Ours."""
+"""Time before a conflict in which running a red light, and an indicator, counts [s]. Ours."""
 JUNCTION = 40.0
 """Distance behind its stop line up to which a light decides on conflicts [m]. Ours: the size of a
 large junction."""
+SLOWED = 0.75
+"""Share of its speed to which one that indicates has slowed down if others may trust that it turns
+off. Ours."""
 CROSSWALK_MARGIN = 0.5
 """Extension of crosswalks along the route [m]. Ours."""
 KERB = 1.0

@@ -62,10 +62,12 @@ from bridgegen.assess.conflict._codes import (
     LEFT_ITS_LANE,
     LEFT_TO_ACT,
     MAP_PRIORITY,
+    MISLED,
     NEEDED,
     NEITHER,
     NO_PRIORITY,
     OBJECT,
+    OPENED,
     OTHER,
     PASSED_TOO_CLOSE,
     PREVENTABLE,
@@ -123,11 +125,13 @@ from bridgegen.assess.conflict._limits import (
     LATELY,
     LATERAL_MOVE,
     LATERAL_SEEN,
+    LOOKED_BACK,
     MARGIN,
     MARGIN_ON_FOOT,
     MOVES,
     OFF_LANE,
     SAME_WAY,
+    SLOWED,
     STANDS,
     STOOD,
     SYSTEM_BRAKING,
@@ -143,6 +147,7 @@ from bridgegen.drivers.kinds import (
     HAZARD,
     IS_ANIMAL,
     IS_CYCLE,
+    IS_OBSTACLE,
     IS_PEDESTRIAN,
     IS_VULNERABLE,
     LEFT,
@@ -162,6 +167,10 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     # A risk only once the ego could see it: a driver does not brake for what it cannot know.
     entry, side, early = entered(scene, 0, e, k, MARGIN_ON_FOOT if on_foot else MARGIN)
     risk, early = visible_from(scene, e, entry, early, k)
+    # A door beside the ego's way is no danger while it is closed.
+    opens = opened_since(scene, e, k) if IS_OBSTACLE[scene.kinds[e]] else -1
+    if opens > risk:
+        risk, early = opens, 0.0
     since, stands = risk, still_since(scene.v[e], scene.first, k)
     # A moving participant was once a risk as soon as it was on the ego's strip: `un-r157`, the
     # regulation's own driver, had 271 critical rows of 1,000 in cut-in, each said to be avoidable
@@ -218,6 +227,15 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
             real,
         )
     real[LEFT_TO_ACT] = max(at - whole[DECIDED], 0) * scene.dt + real[TTC]
+
+
+@kernel
+def opened_since(scene, e, k):
+    """Return the last instant up to k at which body e began to move, or came moving; -1: none."""
+    for i in range(k, scene.first, -1):
+        if scene.v[e, i] > 0.0 and scene.v[e, i - 1] <= 0.0:
+            return i - 1
+    return scene.first if scene.first > 0 and scene.v[e, scene.first] > 0.0 else -1
 
 
 @kernel
@@ -339,11 +357,16 @@ def decide(
                 whole[DECIDED] = min(max(mine, its), k)
             if mine >= 0 and its >= 0:
                 return SHARED, RED_LIGHT
+            # StVO § 1 (2), § 3 (2a): a green light is no licence to run into who is in sight.
+            if its >= 0 and IS_PEDESTRIAN[scene.kinds[e]] and avoidable:
+                return EGO, COULD_HAVE_STOPPED
             return (EGO if mine >= 0 else OTHER), RED_LIGHT
     if kind in (VRU_BY_FRONT, VRU_INTO_SIDE):
         return of_vulnerable(scene, e, k, kind, own, since, avoidable, whole)
     if kind == REAR_END_STRUCK:
         return of_struck(scene, e, k, whole)
+    if kind == OBJECT and opened_since(scene, e, k) >= 0:
+        return (EGO, STANDING_AHEAD) if avoidable else (OTHER, OPENED)
     if kind == OBJECT and scene.v[e, k] > STANDS and not strikes_with_front(own, own_part):
         return OTHER, LEFT_ITS_LANE
     if kind in (REAR_END_STRIKING, OBJECT):
@@ -697,9 +720,11 @@ def of_crossing(scene, e, k, own, risk, seen, avoidable, whole):
         return of_siren(scene, e, k, whole)
     if claim < 0 and not avoidable and not front and has_set_off(scene, e, k):
         return NEITHER, REVEALED_LATE  # struck as it had all but passed, by one that had waited
-    if claim != 0:
-        return (OTHER if claim > 0 else EGO), rule_of(claim)
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
+    if claim != 0:
+        if claim < 0 and not its and misleads(scene, e, k):
+            return SHARED, MISLED
+        return (OTHER if claim > 0 else EGO), rule_of(claim)
     if same_road(scene, e, k):
         if mine != its:
             return (EGO if mine else OTHER), TURNING_GIVES_WAY
@@ -709,6 +734,21 @@ def of_crossing(scene, e, k, own, risk, seen, avoidable, whole):
     j = max(k - int(TURN_TIME / scene.dt), scene.first)
     from_right = scene.c[0, j] * scene.s[e, j] - scene.s[0, j] * scene.c[e, j] > 0.0
     return (EGO if from_right else OTHER), ASSUMED_RIGHT_BEFORE_LEFT
+
+
+@kernel
+def misleads(scene, e, k):
+    """Return whether body e, which does not turn, let the ego believe before k that it would.
+
+    Source: Oberlandesgericht Dresden, 24 April 2014, 7 U 1501/13: an indicator alone is no reason
+    to trust that one with priority turns off; together with slowing down clearly it is.
+    """
+    fastest, trusted = 0.0, False
+    for i in range(max(k - int(LOOKED_BACK / scene.dt), scene.first), k + 1):
+        if shows(scene, e, i, LEFT) or shows(scene, e, i, RIGHT):
+            fastest = max(fastest, scene.v[e, i])
+            trusted = trusted or scene.v[e, i] <= SLOWED * fastest
+    return trusted
 
 
 @kernel

@@ -46,6 +46,7 @@ _BY_NEITHER = {
 _BY_BOTH = {
     Rule.RED_LIGHT: "they crossed their stop lines at red",
     Rule.TURNING_GIVES_WAY: "both turned",
+    Rule.MISLED: "the ego did not give way, the other indicated a turn and went straight on",
     Rule.NO_PRIORITY: "nobody has priority there by law, and neither gave way",
 }
 

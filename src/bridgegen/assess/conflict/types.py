@@ -155,6 +155,8 @@ class Rule(IntEnum):
     CUT_IN_REQUIRED = _codes.CUT_IN_REQUIRED
     REVERSED = _codes.REVERSED
     NO_PRIORITY = _codes.NO_PRIORITY
+    OPENED = _codes.OPENED
+    MISLED = _codes.MISLED
 
     @property
     def label(self) -> str:
@@ -272,6 +274,14 @@ RULES = {
     Rule.NO_PRIORITY: (
         "drove on where nobody has priority by law",
         COUNTRIES["UK"].source,
+    ),
+    Rule.MISLED: (
+        "did not give way to one that indicated a turn, slowed down and went straight on",
+        "StVO § 1 (2), § 8 (2); Oberlandesgericht Dresden, 24 April 2014, 7 U 1501/13",
+    ),
+    Rule.OPENED: (
+        "opened into the path when stopping was no longer possible",
+        "StVO § 14 (1); Vienna Convention, Art. 24",
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",

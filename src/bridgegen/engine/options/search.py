@@ -322,8 +322,8 @@ class CommonOptions(PipelineOptions):
         default=None,
         metadata=option(
             TEXT,
-            "Driver of all other participants: attentive, insistent (gives way to none), or "
-            "scripted (they react to nothing).",
+            "Driver of all other participants: attentive, lawful (so are people on foot and on "
+            "cycles), insistent (gives way to none), or scripted (they react to nothing).",
             shown="what the scenario says",
             before="scripted",
             group=OF_DRIVER,

@@ -229,7 +229,7 @@ def _value(quantity: Quantity, values: Mapping[str, float]) -> float:
 
 ATTENTIVE, INSISTENT, SCRIPTED = "attentive", "insistent", "scripted"
 
-LOOKING = (ATTENTIVE, INSISTENT)
+LOOKING = (ATTENTIVE, INSISTENT, "lawful")
 """Drivers that limit the script by what is in the way."""
 
 DRIVERS = (*LOOKING, SCRIPTED)

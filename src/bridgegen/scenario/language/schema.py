@@ -272,7 +272,7 @@ class ScenarioFile(ShapedSection):
     left its mirror image."""
     driver: Word = "route-follower"
     """Default driver of the ego (see --ego and 'bridgegen list drivers')."""
-    others: Literal["attentive", "insistent", "scripted"] = "scripted"
+    others: Literal["attentive", "insistent", "lawful", "scripted"] = "scripted"
     """Default driver of the other participants (see --others, and their ``driver``)."""
     duration: Seconds
     """Duration of the simulation [s]."""

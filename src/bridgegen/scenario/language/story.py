@@ -124,6 +124,11 @@ class Participant:
         ) or (self,)
 
     @property
+    def is_door(self) -> bool:
+        """Whether it is the door of a vehicle, which is a body of its own once it opens."""
+        return bool(self.path) and self.conduct == "obstacle"
+
+    @property
     def conduct(self) -> Conduct:
         """The rules by which it moves."""
         return PARTICIPANTS[self.type].seen_as.conduct
@@ -275,6 +280,15 @@ class Indication:
 
 
 @dataclass(frozen=True)
+class Opening:
+    """A door opens: it comes into the scenario, and goes along its path from then on."""
+
+    def __str__(self) -> str:
+        """Return what the door does, to be said after its name."""
+        return "opens"
+
+
+@dataclass(frozen=True)
 class WeatherChange:
     """The weather becomes that of other parameters.
 
@@ -291,7 +305,16 @@ class WeatherChange:
         return f"becomes that of {self.prefix}…"
 
 
-Action = SpeedChange | LaneChange | LaneOffset | KeepDistance | Arrival | Indication | WeatherChange
+Action = (
+    SpeedChange
+    | LaneChange
+    | LaneOffset
+    | KeepDistance
+    | Arrival
+    | Indication
+    | Opening
+    | WeatherChange
+)
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ class ParticipantSection(ShapedSection):
     siren: Annotated[bool, Field(strict=True)] = False
     """Whether an emergency vehicle has its blue light and siren on, so that all give way to it."""
     driver: Word | None = None
-    """Driver: attentive, insistent or scripted, instead of ``others``; not of the ego."""
+    """Driver: attentive, insistent, lawful or scripted, instead of ``others``; not of the ego."""
 
 
 class ConditionSection(ShapedSection):
@@ -227,6 +227,7 @@ ACTIONS = (
     "keep_distance",
     "arrive",
     "indicate",
+    "door",
     "weather",
 )
 """Keys of an event that are actions; it has one of them at least."""
@@ -244,7 +245,8 @@ class EventSection(ShapedSection):
     jerk: Number | None = None
     """Rate at which the acceleration, up to ``rate``, builds up and is released [m/s³]."""
     time: Duration | None = None
-    """Duration of the speed change, or of that of the weather, then a constant [s]."""
+    """Duration of the speed change, or of that of the weather, or of the opening of a door; then a
+    constant [s]."""
     distance: Length | None = None
     """Distance covered during the speed change [m]."""
     shape: Literal["linear", "cubic", "sinusoidal"] = "linear"
@@ -259,6 +261,8 @@ class EventSection(ShapedSection):
     """Arrival of the participant at the same time as that of another one elsewhere."""
     indicate: Literal["left", "right", "hazard", "off"] | None = None
     """Indicator or hazard lights that the participant switches on, or off."""
+    door: Literal["left", "right"] | None = None
+    """Front door that a standing vehicle opens, within ``time``."""
     weather: Word | None = None
     """Prefix of the parameters that state the new weather."""
     when: Annotated[list[ConditionSection], Field(min_length=1)]

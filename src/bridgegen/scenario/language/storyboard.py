@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.adversary import DRIVERS, LOOKING
@@ -31,6 +32,7 @@ from bridgegen.scenario.language.story import (
     KeepDistance,
     LaneChange,
     LaneOffset,
+    Opening,
     Participant,
     SpeedChange,
     Waypoint,
@@ -56,6 +58,20 @@ MOST_ASIDE = 4.0
 
 FASTEST_REVERSE = -5.0
 """Fastest speed in reverse [m/s]; 18 km/h is about what a reverse gear does."""
+
+DOOR = Body(1.1, 0.06, 1.1, center_ahead=-0.55, max_speed=1.0, mass=30.0)
+"""A front door of a car, whose reference point is its hinge; ours."""
+
+HINGE_BEHIND = 1.3
+"""Distance from a vehicle's front to the hinges of its front doors [m]; ours."""
+
+DOOR_GAP, DOOR_BEND, DOOR_ANGLE = 0.06, 0.02, math.radians(70.0)
+"""Distance from a vehicle's side to the hinge [m]; and the bend that the hinge goes round, of two
+straight lines of that length [m], so that the door turns by that angle [rad]; ours. A door that
+turned on the spot would have no path, and a body faster than 0.1 m/s is none that stands."""
+
+DOOR_WAY = 0.8819 * 2.0 * DOOR_BEND
+"""Length of the curve of a door's hinge round that bend [m]."""
 
 WEATHER_STEPS = 5
 """Steps of a weather that changes over a time."""
@@ -107,6 +123,7 @@ class Storyboard:
         self._event_names = [str(name) for name, _ in self._events_read]
         self.derived: list[Derived] = []
         self.participants = tuple(self._participants())
+        self.participants += tuple(self._doors())
         self._acting = {participant.name: participant for participant in self.participants}
         self.events = tuple(self._events())
         self.ghosts = tuple(self._ghosts())
@@ -256,6 +273,68 @@ class Storyboard:
             model=given.model or "",
             **{"end": None, **more},
         )
+
+    def _doors(self) -> Iterator[Participant]:
+        """Yield the doors that events open: bodies of their own, closed along their vehicles."""
+        vehicles = {each.name: each for each in self.participants}
+        for key, data in self._events_read:
+            given, path = section(EventSection, data), ("events", key)
+            if given is None or given.door is None:
+                continue
+            of = vehicles.get(str(given.participant))
+            if (
+                of is None
+                or of.conduct != "vehicle"
+                or of.name == EGO
+                or PARTICIPANTS[of.type].on_rails
+            ):
+                self._report(f"{key}: a door is of a vehicle other than the ego", (*path, "door"))
+            elif of.path or of.heading or of.place_by or of.type_by or self._drives(of):
+                what = "stands along its lane, at one place and of one type"
+                self._report(f"{key}: who opens a door {what}, {of.name} does not", (*path, "door"))
+            elif given.time is None or isinstance(given.time, str) or given.time <= 0.0:
+                what = f"a constant time greater than 0 [s], got {given.time}"
+                self._report(f"{key}: a door opens within {what}", (*path, "door"))
+            else:
+                yield self._door(of, given.door, self._quantities.document.at(path))
+
+    def _drives(self, participant: Participant) -> bool:
+        events = (section(EventSection, value) for _, value in self._events_read)
+        return participant.speed != 0.0 or any(
+            event is not None
+            and event.participant == participant.name
+            and (event.speed is not None or event.keep_distance or event.arrive)
+            for event in events
+        )
+
+    def _door(self, of: Participant, side: str, place: str) -> Participant:
+        """Return the closed door of a vehicle; its path is the bend in which it opens."""
+        name, left = door_of(of.name, side), 1.0 if side == "left" else -1.0
+        ahead = of.body.front - HINGE_BEHIND
+        aside = left * (0.5 * of.body.width + DOOR_GAP)
+        turned = DOOR_BEND * elementary.cos(DOOR_ANGLE), DOOR_BEND * elementary.sin(DOOR_ANGLE)
+        bend = ((0.0, 0.0), (DOOR_BEND, 0.0), (DOOR_BEND + turned[0], -left * turned[1]))
+        points: list[Waypoint] = []
+        for number, (along, across) in enumerate(bend, start=1):
+            values: list[Quantity] = []
+            forward = 1.0 if of.start.way == "out" else -1.0
+            for label, start, by in (
+                ("at", of.start.distance, forward * (ahead + along)),
+                ("offset", of.start.offset, aside + across),
+            ):
+                if not isinstance(start, str):
+                    values.append(by + start)
+                elif start in self._quantities.declared:
+                    key, text = f"{name}_{label}_{number}", parse(f"{start} + ({by!r})", place)
+                    why, said = "It is hinged to its vehicle.", f"Where the hinge of {name} is."
+                    self.derived.append(
+                        Derived(key, Axis.PARTICIPANTS, "m", text, why, "ours", said, place)
+                    )
+                    values.append(key)
+                else:
+                    values.append(by)  # an unknown name is reported already
+            points.append(replace(of.start, distance=values[0], offset=values[1]))
+        return Participant(name, "obstacle", points[0], None, 0.0, tuple(points), own_body=DOOR)
 
     def _ghosts(self) -> Iterator[Ghost]:
         for key, data in entries(self._quantities.document, "ghosts"):
@@ -445,6 +524,23 @@ class Storyboard:
                 tuple(self._conditions(given, condition_section, (*path, "when", number)))
                 for number, condition_section in enumerate(given.when)
             )
+            if given.door is not None:
+                door, time = door_of(str(given.participant), given.door), given.time
+                speed = DOOR_WAY / (time if isinstance(time, float) and time > 0.0 else 1.0)
+                opened = ConditionSpec("travelled", 0.98 * DOOR_WAY, of=door)
+                when = tuple(  # of the vehicle: the door is not there yet
+                    tuple(
+                        each
+                        if each.kind in ("time", *_OF_EVENTS)
+                        else replace(each, of=each.of or given.participant)
+                        for each in conditions
+                    )
+                    for conditions in when
+                )
+                begins, ends = SpeedChange(speed, Change()), SpeedChange(0.0, Change())
+                yield EventSpec(name, door, (*actions, begins), when)
+                yield EventSpec(f"{name}_ends", door, (ends,), ((opened,),))
+                continue
             if given.weather is not None and given.time is not None:
                 yield from self._weather_in_steps(name, given, when, path)
                 continue
@@ -517,7 +613,11 @@ class Storyboard:
             yield WeatherChange(given.weather, is_whole)
         elif given.participant is None:
             self._report(f"{name} must have a participant", path)
-        if given.speed is not None:
+        if given.door is not None:
+            if given.speed is not None or given.lane_change or given.weather is not None:
+                self._report(f"{name} opens a door, and does nothing else", path)
+            yield Opening()
+        elif given.speed is not None:
             actor = self._acting.get(str(given.participant))
             slowest = _slowest(actor.name, actor.type) if actor else 0.0
             self._check(given.speed, "m/s", (*path, "speed"), low=slowest)
@@ -693,6 +793,11 @@ class Storyboard:
     def _check_participant(self, name: str, path: Path) -> None:
         if name not in self.known:
             self._report(f"unknown participant '{name}'{nearest(name, self.known)}", path)
+
+
+def door_of(vehicle: str, side: str) -> str:
+    """Return the name of the participant that a front door of a vehicle is."""
+    return f"{vehicle}_{side}_door"
 
 
 def _slowest(name: str, kind: str) -> float:

@@ -19,6 +19,7 @@ from bridgegen.scenario.language.story import (
     KeepDistance,
     LaneChange,
     LaneOffset,
+    Opening,
     Participant,
     RoadWorks,
     SpeedChange,
@@ -101,14 +102,17 @@ def add_participant(
     start = add_position(builder, f"{name}_start", participant.start, site)
     if participant.heading != 0.0:
         builder.quantity(start, "has_relative_heading", participant.heading)
-    teleport = builder.node(f"{name}_teleport", "TeleportAction")
-    put(teleport, "has_position", start)
-    put(node, "has_init_action", teleport)
-    if participant.conduct != "obstacle":
+    if participant.is_door:  # the event in which it opens takes its place and its path
+        _add_trajectory(builder, participant, start, site)
+    else:
+        teleport = builder.node(f"{name}_teleport", "TeleportAction")
+        put(teleport, "has_position", start)
+        put(node, "has_init_action", teleport)
+    if participant.conduct != "obstacle" or participant.is_door:
         speed = builder.node(f"{name}_init_speed", "SpeedAction")
         builder.quantity(speed, "has_target_speed", participant.speed)
         put(node, "has_init_action", speed)
-    if participant.path:
+    if participant.path and not participant.is_door:
         put(node, "has_init_action", _add_trajectory(builder, participant, start, site))
     if participant.end is not None:
         route = builder.node(f"{name}_route", "Route")
@@ -165,7 +169,7 @@ def _add_trajectory(
     trajectory = builder.node(f"{name}_path", "Trajectory")
     put(action, "has_trajectory", trajectory)
     put(trajectory, "has_name", f"{name}_path")
-    if participant.conduct == "vehicle":
+    if participant.conduct in ("vehicle", "obstacle"):
         put(trajectory, "has_spline_order", min(SMOOTH, len(participant.path)))
     for number, point in enumerate(participant.path, start=1):
         vertex = builder.node(f"{name}_vertex_{number}", "Vertex")
@@ -229,7 +233,17 @@ def add_event(
         put(node, "has_who", builder.iri(event.participant))
     number = 0
     for action in event.actions:
-        parts = _SWITCHES[action.side] if isinstance(action, Indication) else (action,)
+        parts: tuple[Action | _Switch, ...] = (action,)
+        if isinstance(action, Indication):
+            parts = _SWITCHES[action.side]
+        elif isinstance(action, Opening):
+            who = str(event.participant)
+            comes = builder.node(f"{event.name}_comes", "AddEntityAction")
+            put(comes, "has_entity_ref", builder.iri(who))
+            put(comes, "has_position", builder.iri(f"{who}_start"))
+            put(node, "has_what", comes)
+            put(node, "has_what", builder.iri(f"{who}_follow"))
+            continue
         for part in parts:
             number += 1
             suffix = "" if number == 1 else f"_{number}"
@@ -314,7 +328,8 @@ def _add_action(
         builder.put(node, "has_position", here)
         builder.put(node, "has_master_position", there)
     else:
-        assert isinstance(action, WeatherChange)  # an Indication is several switches
+        # An Indication is several switches, and an Opening several actions.
+        assert isinstance(action, WeatherChange)
         node = builder.node(name, "EnvironmentAction")
         weather = add_weather(builder, declared, action.prefix)
         if weather is not None:

@@ -99,8 +99,8 @@ class EmbeddedSimulator:
         place: its name, for messages.
         driver: of the ego; the file's by default.
         ideal: idealised stages of the driver; its own by default.
-        others: "attentive", "insistent" or "scripted": the driver of all other participants; the
-            file's by default.
+        others: "attentive", "insistent", "lawful" or "scripted": the driver of all other
+            participants; the file's by default.
         vehicle: how the ego moves, see `bridgegen.simulation.vehicles`; the file's by default.
         time_step: [s]; the file's by default.
         skipped: gets a sentence for each unsupported element, which is then left out instead of

@@ -97,6 +97,13 @@ def add_begun(
     node = builder.cast[name]
     if name not in builder.starts:  # it comes later
         for wrapped in actions:
+            action = wrapped.action
+            if isinstance(action, osc.LongitudinalAction) and (
+                isinstance(action.action, osc.SpeedAction)
+                and isinstance(action.action.speed_action_target.target, osc.AbsoluteTargetSpeed)
+                and action.action.speed_action_target.target.value == 0.0
+            ):
+                continue  # that it stands is stated anyhow
             text = f"an initial action of {name}, which comes later,"
             builder.problems.append(Lost(wrapped.line, text))
         return

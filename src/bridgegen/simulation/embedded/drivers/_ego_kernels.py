@@ -17,7 +17,8 @@ from bridgegen.drivers._following_kernels import COMFORT_ACCELERATION
 from bridgegen.drivers._gap_kernels import leads_on, led_aside
 from bridgegen.drivers._path_kernels import project
 from bridgegen.drivers._weather_columns import FRICTION
-from bridgegen.drivers.drivers import SCRIPTED
+from bridgegen.drivers.drivers import LAWFUL, SCRIPTED
+from bridgegen.drivers.kinds import IS_VEHICLE
 from bridgegen.simulation.embedded._codes import (
     DOES,
     KEEP_ASIDE,
@@ -34,6 +35,7 @@ from bridgegen.simulation.embedded._motion_kernels import SAME_SPEED, STANDS, bi
 from bridgegen.simulation.embedded.chassis._chassis_columns import SPEED, H, X, Y
 from bridgegen.simulation.embedded.motion import (
     ENDS,
+    LANDS,
     begin_lane_change,
     is_pointless,
     move_along_path,
@@ -312,11 +314,15 @@ def heed(k, plan, roads, state, record):
             j = state.lateral_action[e]
             if j >= 0 and plan.actions[j, DOES] != KEEP_ASIDE:
                 target = state.lateral_target[e]
+            rules = 1 if IS_VEHICLE[plan.kinds[e]] else 0
+            if plan.others[e] == LAWFUL:
+                rules = 2 if roads.follows[p] == LANDS else 1
             mind[ASKED] = look(
-                e, state.command[e], stop, state.weather[FRICTION], roads.paths, roads.counts,
-                roads.steps, state.station, state.on, state.aside, target, state.minded,
-                state.seen, state.far, plan.bodies, plan.kinds, roads.meets[e], roads.meetings[e],
-                roads.claims[e], roads.lines[e], roads.signs[e], state.lights, mind,
+                e, state.command[e], stop, state.weather[FRICTION], rules, roads.paths,
+                roads.counts, roads.steps, state.station, state.on, state.aside, target,
+                state.minded, state.seen, state.far, plan.bodies, plan.kinds, roads.meets[e],
+                roads.meetings[e], roads.claims[e], roads.lines[e], roads.signs[e], state.lights,
+                mind,
             )  # fmt: skip
         state.allowed[e] = react(k, plan.dt, mind[ASKED], mind)
 

@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bridgegen.base.arrays import Float, Int
-from bridgegen.drivers.drivers import ATTENTIVE
-from bridgegen.drivers.scene import stop_lines, stop_signs
+from bridgegen.drivers.drivers import ATTENTIVE, LAWFUL
+from bridgegen.drivers.kinds import IS_PEDESTRIAN
+from bridgegen.drivers.scene import kerbs, stop_lines, stop_signs
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.simulation.embedded.places.ways import Ways
 from bridgegen.simulation.embedded.program import Program
@@ -20,8 +21,10 @@ class Meetings(NamedTuple):
         meets: ``(P, E)`` int64, whether there is anything in the following.
         meetings: ``(P, E, E, ZONE)`` where an attentive participant's first path meets each
             other's, see ``bridgegen.drivers._yielding_kernels``; infinite where it does not.
-        lines: ``(P, E, S)`` [m], the stations of the stop lines of S lights on its path, else +inf.
-        signs: ``(P, E, H)`` [m], the stations of the lines of stop signs on it; +inf pads.
+        lines: ``(P, E, S)`` [m], the stations of the stop lines of S lights on its path, else +inf;
+            off the lanes, of the kerbs where the light is for the traffic that it crosses.
+        signs: ``(P, E, H)`` [m], the stations of the lines of stop signs on it; off the lanes, of
+            the kerbs from which it has no priority; +inf pads.
     """
 
     meets: Int
@@ -45,10 +48,19 @@ def meetings(program: Program, models: Sequence[OpenDrive], ways: Sequence[Ways]
     zones, lines = np.full((p, e, e, ZONE), np.inf), np.full((p, e, lights), np.inf)
     signs: dict[tuple[int, int], list[float]] = {}
     for number, (model, known) in enumerate(zip(models, ways, strict=True)):
-        for item in np.flatnonzero(program.others == ATTENTIVE).tolist():
+        for item in np.flatnonzero(np.isin(program.others, (ATTENTIVE, LAWFUL))).tolist():
             _find_zones(zones[number, item], item, program, known)
             route = known.routes[item]
             if route is None:
+                if program.others[item] == LAWFUL:
+                    path = known.paths[item]
+                    signs[number, item] = []
+                    for kerb in reversed(kerbs(model, path.table, path.step, program.lights)):
+                        for light in kerb.lights:
+                            lines[number, item, program.lights.index(light)] = kerb.station
+                        # On a crosswalk people on foot go first, not those who ride on it.
+                        if not (kerb.crossing and IS_PEDESTRIAN[program.kinds[item]]):
+                            signs[number, item].append(kerb.station)
                 continue
             for line in reversed(stop_lines(model, route, program.lights)):
                 lines[number, item, program.lights.index(line.light)] = line.station

@@ -9,10 +9,11 @@ import numpy as np
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.interface import RoadMap
+from bridgegen.drivers.kinds import IS_CYCLE, IS_PEDESTRIAN
 from bridgegen.drivers.lane_tables import CORRIDOR, LANE, corridor_along, lanes_along
 from bridgegen.drivers.map_grid import grid_of, no_grid
 from bridgegen.drivers.road_map import road_map
-from bridgegen.drivers.scene import Scene, beside, stacked, stop_lines, survey
+from bridgegen.drivers.scene import Scene, beside, kerbs, stacked, stop_lines, survey
 from bridgegen.openx.opendrive.lane_graph import Cells, Ground
 from bridgegen.openx.opendrive.lanes import section_index
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -43,7 +44,7 @@ class Network:
             against it; what is to its left, then, of what is to the road's.
         scene: what a driver with stages knows of them.
         stop_entities: ``(L,)`` int64, whose first route crosses each stop line of a light.
-        stop_lights: ``(L,)`` int64, the light of each.
+        stop_lights: ``(L,)`` int64, the light of each; see `Rollout.stop_lights`.
         stop_lines: ``(P, L, 3)`` float64, where: x, y [m] and heading [rad], NaN in a road network
             where the route does not cross it.
         turnings: the ways of the ego whose route changes lanes; see `Ways.turnings`.
@@ -383,21 +384,31 @@ def _stop_lines(
 ) -> tuple[Int, Int, Float]:
     """Return the stop lines of lights that the participants' first routes cross, the ego's first.
 
+    Off the lanes, these are the kerbs of crosswalks whose traffic has lights.
+
     Returns:
-        ``(L,)`` int64, whose route crosses each; ``(L,)`` int64, its light; ``(P, L, 3)`` float64,
+        ``(L,)`` int64, whose route crosses each; ``(L,)`` int64, its light, ``~light`` of a kerb;
+        ``(P, L, 3)`` float64,
         where: x, y [m] and heading [rad], NaN in a road network where it does not.
     """
     found: list[dict[tuple[int, int], Float]] = []
     for model, ways in zip(models, each, strict=True):
         lines: dict[tuple[int, int], Float] = {}
         for entity, route in enumerate(ways.routes if program.lights else ()):
-            if route is None:
-                continue
             path = ways.paths[entity]
             stations = np.arange(len(path.table)) * path.step
-            for line in reversed(stop_lines(model, route, program.lights)):
-                pose = [np.interp(line.station, stations, path.table[:, i]) for i in range(3)]
-                lines[entity, program.lights.index(line.light)] = np.array(pose)
+            crossed: list[tuple[int, float]] = []
+            if route is not None:
+                for line in reversed(stop_lines(model, route, program.lights)):
+                    crossed.append((program.lights.index(line.light), line.station))
+            elif entity < len(program.names) and (
+                IS_PEDESTRIAN[program.kinds[entity]] or IS_CYCLE[program.kinds[entity]]
+            ):
+                for kerb in reversed(kerbs(model, path.table, path.step, program.lights)):
+                    crossed += ((~program.lights.index(it), kerb.station) for it in kerb.lights)
+            for light, station in crossed:
+                pose = [np.interp(station, stations, path.table[:, i]) for i in range(3)]
+                lines[entity, light] = np.array(pose)
         found.append(lines)
     keys = sorted({key for lines in found for key in lines})
     poses = np.full((len(found), len(keys), 3), np.nan)
