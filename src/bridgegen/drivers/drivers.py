@@ -48,10 +48,10 @@ TIME_LIMIT = 10.0
 """Default time limit of one call of a user's driver [s]."""
 
 
-SCRIPTED, ATTENTIVE, INSISTENT = 0, 1, 2
+SCRIPTED, ATTENTIVE, INSISTENT, TESTED = range(4)
 """Codes of the drivers of participants other than the ego."""
 
-CODES = {"scripted": SCRIPTED, "attentive": ATTENTIVE, "insistent": INSISTENT}
+CODES = {"scripted": SCRIPTED, "attentive": ATTENTIVE, "insistent": INSISTENT, "ego": TESTED}
 """Codes of the drivers of participants other than the ego, by name."""
 
 OTHERS = {

@@ -205,6 +205,12 @@ class SimulatorChoice:
                 f"{embedded.program.place}: the vehicle '{vehicle}' is of the embedded simulator; "
                 f"{self.name} moves the ego in its own way (--vehicle {KINEMATIC})"
             )
+        if embedded.partners and self.name != EMBEDDED.name:
+            names = ", ".join(partner.program.names[0] for partner in embedded.partners)
+            raise InputError(
+                f"{embedded.program.place}: the ego's driver drives {names}, too, which only the "
+                f"embedded simulator runs, got {self.name}"
+            )
         if storyboard.left_hand and self.name not in _OURS:
             raise InputError(
                 f"{embedded.program.place}: traffic drives on the left, which the simulators "

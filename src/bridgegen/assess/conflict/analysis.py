@@ -1,7 +1,7 @@
 """The conflict analysis of rollouts: conflicts of the ego with each other participant."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -97,7 +97,10 @@ class Conflicts:
             lanes, or the edge of the road, at most, left positive; of a close pass the clearance;
             else 0.
         breach: ``(N, E)`` in [0, 1], of a violation: 1 where it is a failure; else 0.
-        body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own.
+        body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own; or the further
+            vehicle that the ego's driver drives, whose conflict is the worse one. Its conflict with
+            the ego is in its own column.
+        driven: the numbers of these vehicles.
         left_hand: whether it happened in the mirror image of left-hand traffic.
         country: by whose law it is judged, a code of ISO 3166-1; "" where none is stated.
     """
@@ -135,6 +138,21 @@ class Conflicts:
     breach: Float
     left_hand: bool = False
     country: str = ""
+    driven: tuple[int, ...] = ()
+
+    def parties(self, other: Int) -> tuple[Int, Int]:
+        """Return whose conflict the one in a column of each row is, and with whom.
+
+        Args:
+            other: ``(N,)`` the columns.
+
+        Returns:
+            ``(N,)`` numbers of the driven vehicle and of the other participant; they are equal
+            where there is none.
+        """
+        body = self.body[np.arange(len(other)), other]
+        vehicle = np.where(np.isin(body, self.driven), body, 0)
+        return vehicle, np.where(other == 0, vehicle, np.where(other == vehicle, 0, other))
 
     @cached_property
     def at_fault(self) -> Bool:
@@ -153,7 +171,7 @@ class Conflicts:
 
 
 def analyse(rollout: Rollout) -> Conflicts:
-    """Return the conflicts of a rollout, computed once.
+    """Return the conflicts of a rollout, computed once: of all vehicles that the driver drives.
 
     Source: Najm et al., DOT HS 810 767 (types); docs/conflicts.md describes the rules.
     """
@@ -162,13 +180,32 @@ def analyse(rollout: Rollout) -> Conflicts:
 
 def encounters(rollout: Rollout) -> Conflicts:
     """Return the same without violations: what the ego and another are involved in."""
-    return shared(rollout, _analyse)
+    return _of_all(rollout, lambda view: shared(view, _analyse))
 
 
 def _with_violations(rollout: Rollout) -> Conflicts:
     from bridgegen.assess.conflict.violations import with_violations  # which imports this module
 
-    return with_violations(rollout, encounters(rollout))
+    return _of_all(rollout, lambda view: with_violations(view, shared(view, _analyse)))
+
+
+def _of_all(rollout: Rollout, judge: Callable[[Rollout], Conflicts]) -> Conflicts:
+    """Return the conflicts of all vehicles that the driver drives: of each pair the worse one."""
+    from bridgegen.assess.conflict.harm import harm_of_pairs  # which imports this module
+
+    found = judge(rollout)
+    for view in rollout.egos:
+        e, part = rollout.names.index(view.names[0]), judge(view)
+        mine, its = harm_of_pairs(found), harm_of_pairs(part)
+        worse = (its > mine) | ((its == mine) & (part.kind > found.kind))
+        pairs: dict[str, Any] = {
+            item.name: np.where(worse, getattr(part, item.name), array)
+            for item in fields(found)
+            if isinstance(array := getattr(found, item.name), np.ndarray) and array.ndim == 2
+        }
+        pairs["body"] = np.where(worse, e, found.body)
+        found = replace(found, **pairs, driven=(*found.driven, e))
+    return found
 
 
 def analyse_by(rollout: Rollout, kernel: Callable[..., None]) -> Conflicts:

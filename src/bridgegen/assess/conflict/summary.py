@@ -1,9 +1,12 @@
 """The decisive conflict of one scenario, with all its figures."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, Self
+
+import numpy as np
 
 from bridgegen.assess.conflict._limits import HORIZON
 from bridgegen.assess.conflict.analysis import (
@@ -76,7 +79,21 @@ def sentence(conflicts: Conflicts, row: int, other: int) -> str:
         raise IndexError(
             f"row must be 0 to {n - 1} and other 0 to {e - 1}, got row={row}, other={other}"
         )
-    name = f"'{conflicts.names[other]}'"
+    vehicle, partner = _parties(conflicts, row, other)
+    name = f"'{conflicts.names[partner]}'"
+    said = _sentence(conflicts, row, other, name)
+    # Of several egos each is called by its name.
+    return re.sub(r"\b([Tt]he ego)\b", rf"\1 {conflicts.names[vehicle]}", said) if vehicle else said
+
+
+def _parties(conflicts: Conflicts, row: int, other: int) -> tuple[int, int]:
+    """Return whose conflict it is, and with whom; equal of a departure."""
+    columns = np.full(len(conflicts.kind), other)
+    vehicle, partner = conflicts.parties(columns)
+    return int(vehicle[row]), int(partner[row])
+
+
+def _sentence(conflicts: Conflicts, row: int, other: int, name: str) -> str:
     kind = conflicts.kind[row, other]
     if kind == NO_CONFLICT:
         return ""
@@ -105,7 +122,7 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
     closing = conflicts.closing_normal[row, other]
     own = Zone(int(conflicts.zone_ego[row, other])).label
     mine, whole = f"ego's {own}", "the ego"
-    if conflicts.body[row, other] > 0:
+    if conflicts.body[row, other] > 0 and not _parties(conflicts, row, other)[0]:
         mine, whole = f"{own} of the ego's trailer", "the ego's trailer"
     its = Zone(int(conflicts.zone_other[row, other])).label
     kind = ConflictType(int(conflicts.type[row, other]))
@@ -239,6 +256,8 @@ class ConflictSummary:
         harm: in [0, 1], as the row's, but of this conflict alone.
         aside: of a violation, see `Conflicts.aside` [m]; else 0.
         avoidance: the end of ``sentence`` that says whether braking would have avoided it.
+        vehicle: name of the further vehicle that the ego's driver drives, of whose conflict all
+            this is; "" of the ego's.
     """
 
     conflict: str
@@ -271,6 +290,7 @@ class ConflictSummary:
     harm: float
     aside: float = 0.0
     avoidance: str = ""
+    vehicle: str = ""
 
     @property
     def bare(self) -> str:
@@ -312,6 +332,7 @@ class ConflictSummary:
             "zone_other",
         ):
             texts[name] = getattr(self, name) or None
+        texts |= {"vehicle": self.vehicle} if self.vehicle else {}
         texts["preventable"] = self.preventable if self.happened else None
         return texts | {
             name: {"value": value if isfinite(value) else None, "unit": unit}
@@ -347,6 +368,7 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
     kind = int(conflicts.kind[row, other])
     rule = Rule(conflicts.rule[row, other])
     happened = kind >= NEAR_MISS
+    vehicle, partner = _parties(conflicts, row, other)
     sort = ConflictType(conflicts.type[row, other])
 
     def number(name: str) -> float:
@@ -374,7 +396,8 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
         conflict=KINDS[kind],
         sentence=sentence(conflicts, row, other),
         avoidance=avoidance(conflicts, row, other),
-        partner=conflicts.names[other] if other else "",
+        partner=conflicts.names[partner] if partner != vehicle else "",
+        vehicle=conflicts.names[vehicle] if vehicle else "",
         type=sort.label,
         type_source=sort.source,
         responsible=Responsible(conflicts.responsible[row, other]).label if happened else "",

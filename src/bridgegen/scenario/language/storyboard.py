@@ -394,11 +394,24 @@ class Storyboard:
                 f"'{driver}' here",
                 place,
             )
+        elif driver == EGO:
+            fits = PARTICIPANTS[given.type]
+            if (
+                fits.seen_as.conduct != "vehicle"
+                or fits.on_rails
+                or given.path
+                or not (given.end or given.places)
+            ):
+                self._report(
+                    f"the ego's driver drives vehicles that have a start and an end on lanes, as "
+                    f"the ego has; {name} is of type {given.type}",
+                    place,
+                )
         elif driver not in DRIVERS:
             hint = nearest(driver, DRIVERS)
             self._report(
-                f"the driver of {name} must be one of {', '.join(DRIVERS)} (others are for the "
-                f"ego), got '{driver}'{hint}",
+                f"the driver of {name} must be one of {', '.join(DRIVERS)}, ego (others are for "
+                f"the ego), got '{driver}'{hint}",
                 place,
             )
         elif driver in LOOKING and PARTICIPANTS[given.type].seen_as.conduct == "obstacle":
@@ -458,7 +471,8 @@ class Storyboard:
                 self._report(f"{name} must have an action: {', '.join(ACTIONS)}", path)
             if given.participant is not None:
                 self._check_participant(given.participant, (*path, "participant"))
-                if given.participant == EGO:
+                acting = self._acting.get(given.participant)
+                if given.participant == EGO or (acting and acting.driver == EGO):
                     self._report("events move the others; the ego's driver is under test", path)
             when = tuple(
                 tuple(self._conditions(given, condition_section, (*path, "when", number)))

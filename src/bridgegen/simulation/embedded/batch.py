@@ -18,7 +18,7 @@ from bridgegen.drivers._surroundings_kernels import AROUND
 from bridgegen.drivers._tracking_kernels import TRACK
 from bridgegen.drivers._weather_columns import FRICTION, WEATHER
 from bridgegen.drivers.compiled import CONFLICT
-from bridgegen.drivers.drivers import DEMAND, STAGES, STORYBOARD
+from bridgegen.drivers.drivers import DEMAND, SCRIPTED, STAGES, STORYBOARD, TESTED
 from bridgegen.drivers.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.drivers.kinds import DETECTION, NEEDS_ROOM
 from bridgegen.drivers.lane_tables import STRAYS
@@ -107,11 +107,10 @@ class Batch:
         self._messages: dict[int, str] = {}
         self._has_addresses = False
 
-    @property
-    def pieces(self) -> Float:
-        """The pieces of the first row's map, ``(K, ·)`` as `PIECE` has them."""
-        pieces: Float = self._roads.tables.pieces[self._rows[0]]
-        return pieces
+    def pieces(self) -> tuple[Float, Int]:
+        """Return the pieces of the rows' maps, ``(P, K, ·)`` as `PIECE` has them, and whose."""
+        used, of = np.unique(self._rows, return_inverse=True)
+        return self._roads.tables.pieces[used], of.reshape(-1)
 
     @property
     def running(self) -> Bool:
@@ -453,6 +452,7 @@ def _plan(program: Program, until_collision: bool) -> memory.Plan:
         "dt": program.time_step,
         **stages,
     }
+    given["others"] = np.where(program.others == TESTED, SCRIPTED, program.others)
     tables = {name: getattr(program, name) for name in memory.Plan._fields if name not in given}
     return memory.Plan(**tables, **given)
 

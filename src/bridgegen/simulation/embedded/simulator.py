@@ -13,6 +13,8 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import Driver
 from bridgegen.drivers._weather_columns import WEATHER
+from bridgegen.drivers.address import is_remote
+from bridgegen.drivers.noise import key_of_another
 from bridgegen.drivers.user_drivers import Traits
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -108,6 +110,8 @@ class EmbeddedSimulator:
 
     Attributes:
         program: the compiled storyboard.
+        partners: of each further vehicle that the ego's driver drives, a simulator of the same
+            storyboard in which that vehicle is the ego; see `together`.
 
     Raises:
         UnsupportedError: what it cannot run, by name and line, all of it at once.
@@ -126,7 +130,8 @@ class EmbeddedSimulator:
         time_step: float | None = None,
         skipped: list[str] | None = None,
     ) -> None:
-        self.program = compile_storyboard(
+        compiled = partial(
+            compile_storyboard,
             storyboard,
             place,
             driver=driver,
@@ -134,12 +139,23 @@ class EmbeddedSimulator:
             others=others,
             vehicle=vehicle,
             time_step=time_step,
-            skipped=skipped,
         )
+        self.program = compiled(skipped=skipped)
+        self.partners: tuple[EmbeddedSimulator, ...] = ()
+        for e in self.program.tested.tolist():
+            partner = EmbeddedSimulator.__new__(EmbeddedSimulator)
+            partner.program = compiled(ego=e, skipped=None if skipped is None else [])
+            partner.partners = ()
+            self.partners += (partner,)
+        if self.partners and is_remote(self.program.driver.spec):
+            raise InputError(
+                f"{place}: the driver '{self.program.driver.name}' in another process drives one "
+                f"vehicle, this scenario has it drive {self.partners[0].program.names[0]}, too"
+            )
 
     def __getstate__(self) -> dict[str, Any]:
         """Another process has the same storyboard, and processes of its own for a user's driver."""
-        return {"program": self.program}
+        return {"program": self.program, "partners": self.partners}
 
     @property
     def embedded(self) -> "EmbeddedSimulator":
@@ -197,7 +213,11 @@ class EmbeddedSimulator:
         self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()
     ) -> Network:
         """See `Simulator`: each entity's route, planned and sampled."""
-        return Network(self.program, models, courses)
+        network = Network(self.program, models, courses)
+        network.partners = tuple(
+            Network(partner.program, models, courses) for partner in self.partners
+        )
+        return network
 
     def run(
         self,
@@ -268,7 +288,8 @@ class EmbeddedSimulator:
     ) -> "Callable[[Int], Batch]":
         """Return what sets up some of the rows for the user's driver."""
         traits = self._own.traits
-        roads.provide(traits.wants)
+        for network in (roads, *roads.partners):
+            network.provide(traits.wants)
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
 
         def some(at: Int) -> "Batch":
@@ -333,8 +354,8 @@ class EmbeddedSimulator:
 
     def stop(self) -> None:
         """See `Simulator`."""
-        if self.program.driver.is_own:
-            self._own.stop()
+        for simulator in (self, *self.partners) if self.program.driver.is_own else ():
+            simulator._own.stop()
 
     @property
     def own_driver(self) -> "OwnDriver":
@@ -403,4 +424,18 @@ class EmbeddedSimulator:
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
         program = self.program.changed(driver=driver, dry=dry, kinematic=kinematic)
-        return Batch(program, roads, rows, values, own, noise, until_collision)
+        if not self.partners:
+            return Batch(program, roads, rows, values, own, noise, until_collision)
+        from bridgegen.simulation.embedded.together import Partner, Together
+
+        keys = self.noise_keys(values, len(rows)) if noise is None else noise
+        found = []
+        for simulator, network in zip(self.partners, roads.partners, strict=True):
+            there = simulator.program.changed(driver=driver, dry=dry, kinematic=kinematic)
+            name, wheel = there.names[0], None
+            other = Batch(there, network, rows, values, own, key_of_another(keys, name))
+            if own is not None:
+                wheel = partial(simulator._own.wheel, there)
+            found.append(Partner(self.program.names.index(name), other, wheel))
+        # A row in which one vehicle collides goes on for the other.
+        return Together(found, program, roads, rows, values, own, keys)

@@ -76,7 +76,8 @@ class Controllers:
 
     def of(self, entity: int) -> Iterator[osc.Controller]:
         """Yield an entity's controllers from the start on, in the order of the file."""
-        owner = self._tables.objects[entity]
+        owner = self._tables.owner if entity == 0 else self._tables.objects[entity]
+        assert owner is not None
         for controller in owner.object_controllers:
             yield controller.controller
         for private in self._scenario.storyboard.init.actions.privates:
