@@ -190,12 +190,27 @@ def _with_violations(rollout: Rollout) -> Conflicts:
 
 
 def _of_all(rollout: Rollout, judge: Callable[[Rollout], Conflicts]) -> Conflicts:
-    """Return the conflicts of all vehicles that the driver drives: of each pair the worse one."""
+    """Return the conflicts of all vehicles that the driver drives: of each pair the worse one.
+
+    Only events up to the first contact of any of them count: bodies that have met drive on.
+    """
+    if not rollout.egos:
+        return judge(rollout)
     from bridgegen.assess.conflict.harm import harm_of_pairs  # which imports this module
 
-    found = judge(rollout)
-    for view in rollout.egos:
-        e, part = rollout.names.index(view.names[0]), judge(view)
+    touches = [np.any(view.distance <= 0.0, axis=1) for view in (rollout, *rollout.egos)]
+    firsts = [np.where(each.any(axis=1), each.argmax(axis=1), each.shape[1]) for each in touches]
+    end = np.min(firsts, axis=0)
+    found, *parts = (
+        judge(
+            replace(
+                view, n_steps=np.where(end < own, np.minimum(end + 1, view.n_steps), view.n_steps)
+            )
+        )
+        for view, own in zip((rollout, *rollout.egos), firsts, strict=True)
+    )
+    for view, part in zip(rollout.egos, parts, strict=True):
+        e = rollout.names.index(view.names[0])
         mine, its = harm_of_pairs(found), harm_of_pairs(part)
         worse = (its > mine) | ((its == mine) & (part.kind > found.kind))
         pairs: dict[str, Any] = {

@@ -1,0 +1,169 @@
+"""Several egos: the driver under test drives further vehicles, and all of them are judged."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.approval import approve, refuses
+
+from bridgegen.assess.conflict.analysis import CONTACT, analyse
+from bridgegen.assess.conflict.harm import COURSE, NEAR_MISS, decisive
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.assess.conflict.summary import summarise
+from bridgegen.base.errors import InputError, ScenarioError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.engine.trials import Trials
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.scenario.language.reader import load, shipped_text
+from bridgegen.simulation.choice import SimulatorChoice
+
+EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
+TEXT = shipped_text("platoon").decode().replace("duration: 20.0", "duration: 6.0")
+FIRST = TEXT[TEXT.index("  first:\n") : TEXT.index("  lead:\n")]
+MOTION = ("x", "y", "h", "v", "a")
+
+
+@pytest.fixture
+def made(tmp_path):
+    def make(ego: str = "route-follower", text: str = TEXT, **options) -> Pipeline:
+        path = tmp_path / "platoon.yaml"
+        path.write_text(text, "utf-8")
+        scenario = load(path)
+        return Pipeline(scenario, scenario.space(), PipelineOptions(ego=ego, **options))
+
+    return make
+
+
+def rows(pipeline: Pipeline, n: int = 24) -> np.ndarray:
+    return pipeline.space.decode(np.random.default_rng(3).random((n, pipeline.space.n_var)))
+
+
+@pytest.mark.parametrize(("ego", "ideal"), [("route-follower", ()), ("reference", ("perception",))])
+def test_two_that_change_places_change_motion_and_verdicts(made, ego, ideal):
+    """Only the names differ; the ego of the first is the further vehicle of the second."""
+    one = made(ego, ideal=ideal)
+    swapped = TEXT.replace("  ego:\n", "  one:\n").replace("  first:\n", "  ego:\n")
+    swapped = swapped.replace("  one:\n", "  first:\n").replace("    driver: ego\n", "")
+    swapped = swapped.replace(
+        "  first:\n    type: car\n", "  first:\n    type: car\n    driver: ego\n"
+    )
+    X = rows(one)
+    first, second = one.rollout(X), made(ego, swapped, ideal=ideal).rollout(X)
+    assert (first.status == 0).all()
+    assert first.egos[0].names == ("first", "ego", "lead")
+    for name in MOTION:
+        assert np.array_equal(getattr(first, name), getattr(second, name)[:, [1, 0, 2]])
+        assert np.array_equal(getattr(first.egos[0], name), getattr(second, name))
+        assert np.array_equal(getattr(second.egos[0], name), getattr(first, name))
+    found, other = analyse(first), analyse(second)
+    assert np.array_equal(decisive(found)[1], decisive(other)[1])
+    column = decisive(found)[0]
+    assert np.array_equal(column, decisive(other)[0])  # both have the lead, or each other
+    mine, its = found.parties(column)[0], other.parties(column)[0]
+    course = decisive(found)[1] >= COURSE  # else both merely come as near to each other
+    assert np.array_equal(mine[course], 1 - its[course])
+    assert {*mine[course]} == {0, 1} or not ideal
+    for name in ("kind", "type", "responsible", "rule", "instant", "severity", "ttc", "v_ego"):
+        at = np.arange(len(X)), column
+        assert np.array_equal(getattr(found, name)[at], getattr(other, name)[at])
+
+
+@pytest.mark.parametrize("ego", ["route-follower", "reference"])
+def test_one_that_meets_nobody_leaves_the_ego_s_results(made, ego):
+    text = TEXT.replace("value: 50 + gap + 4.6", "value: 600.0 + gap")
+    text = text.replace("value: first_at + gap_ahead", "value: 50 + gap_ahead")
+    tested, scripted = made(ego, text), made(ego, text.replace("    driver: ego\n", ""))
+    X = rows(tested)
+    alone, beside = scripted.rollout(X), tested.rollout(X)
+    for name in (*MOTION, "offset"):
+        assert np.array_equal(getattr(alone, name)[:, 0], getattr(beside, name)[:, 0])
+    for name in ("n_steps", "progress", "began"):
+        assert np.array_equal(getattr(alone, name), getattr(beside, name))
+    assert np.array_equal(scripted.measure(alone), tested.measure(beside))
+
+
+def test_a_row_fails_if_a_further_vehicle_does_and_says_which(made):
+    pipeline = made()
+    X = rows(pipeline)
+    rollout = pipeline.rollout(X)
+    found = analyse(rollout)
+    other, harm = decisive(found)
+    hit = np.flatnonzero(harm >= NEAR_MISS)
+    assert (found.kind[hit, 2] == CONTACT).any()
+    assert (found.parties(other)[0][hit] == 1).all()  # it hits the lead first; the ego follows it
+    assert (plausibility(rollout).code == 0).all()  # its contact is no implausible traffic
+    summary = summarise(found, int(hit[0]))
+    assert (summary.vehicle, summary.partner) == ("first", "lead")
+    approve(summary.sentence, "The ego first's front", "'lead'")
+    trials = Trials.of(rollout, *pipeline.runner.roads_of(X), "harm", "ego")
+    assert {*trials.place[hit]} == {"on the route of first"}
+    assert {*trials.findings.partner[hit]} == {"lead"}
+
+
+@pytest.mark.parametrize("ego", ["reference", f"{EXAMPLES / 'my_driver.py'}:MyDriver"])
+def test_a_row_is_the_same_in_any_batch(made, ego):
+    pipeline = made(ego)
+    X = rows(pipeline, 6)
+    whole, alone = pipeline.rollout(X), pipeline.rollout(X[4:5])
+    assert (whole.status == 0).all()
+    for a, b in ((whole, alone), (whole.egos[0], alone.egos[0])):
+        for name in (*MOTION, "detections"):
+            assert np.array_equal(getattr(a, name)[4:5], getattr(b, name)), name
+    assert np.array_equal(whole.x, whole.egos[0].x[:, [1, 0, 2]])
+    pipeline.runner.embedded.stop()
+
+
+def test_sensors_of_two_vehicles_err_independently(made):
+    rollout = made("reference").rollout(rows(made("reference"), 4))
+    seen, its = (each.detections[:, 2, ::2, 0] for each in (rollout, rollout.egos[0]))
+    assert seen.shape == its.shape
+    assert (seen != its).any()
+
+
+def test_a_user_s_compiled_driver_drives_them_as_it_drives_one(made, tmp_path):
+    source = tmp_path / "compiled.py"
+    source.write_text(
+        "from bridgegen.drivers.compiled import compiled_driver\n\n"
+        "@compiled_driver(memory=1)\n"
+        "def drive(scene, ego, route, tracks, memory):\n"
+        "    memory[0] += 1.0\n"
+        "    return (ego.target_speed - ego.v) / 0.5 - 0.01 * memory[0], 0.0\n",
+        "utf-8",
+    )
+    both = made(f"{source}:drive")
+    scripted = made(f"{source}:drive", TEXT.replace("    driver: ego\n", ""))
+    X = rows(both, 3)
+    rollout = both.rollout(X)
+    assert (rollout.status == 0).all()
+    for name in MOTION:  # it sees nobody: alone, where the rollout calls it, it drives the same
+        assert np.array_equal(
+            getattr(rollout, name)[:, 0], getattr(scripted.rollout(X), name)[:, 0]
+        )
+    np.testing.assert_allclose(rollout.v[:, 0], rollout.v[:, 1], atol=1e-9)
+
+
+def test_an_exported_file_gives_the_same_bits(made, tmp_path):
+    pipeline = made("reference")
+    X = rows(pipeline, 2)
+    files = write_scenario(pipeline, X[1], tmp_path, "one")
+    (source,) = (path for path in map(Path, files) if path.suffix == ".xosc")
+    assert 'name="driver" value="ego"' in source.read_text("utf-8")
+    result, rollout = simulate_file(source), pipeline.rollout(X)
+    for name in (*MOTION, "detections"):
+        assert np.array_equal(getattr(result.rollout, name)[0], getattr(rollout, name)[1])
+        its = result.rollout.egos[0], rollout.egos[0]
+        assert np.array_equal(getattr(its[0], name)[0], getattr(its[1], name)[1])
+
+
+def test_what_cannot_be_driven_is_refused(made):
+    with refuses(ScenarioError, "start and an end", "first"):
+        made(text=TEXT.replace(FIRST, FIRST.replace("    end: {distance: 780.0}\n", "")))
+    with refuses(ScenarioError, "under test"):
+        made(text=TEXT.replace("    participant: lead", "    participant: first"))
+    with refuses(InputError, "first", "one vehicle"):
+        made("connect:localhost:4711")
+    with refuses(InputError, "first", "embedded"):
+        scenario = load("platoon")
+        Pipeline(scenario, scenario.space(), simulator=SimulatorChoice("esmini"))
