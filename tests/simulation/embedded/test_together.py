@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.approval import approve, refuses
 
-from bridgegen.assess.conflict.analysis import CONTACT, analyse
+from bridgegen.assess.conflict.analysis import CONTACT, Responsible, analyse
 from bridgegen.assess.conflict.findings import Findings
 from bridgegen.assess.conflict.harm import COURSE, NEAR_MISS, decisive
 from bridgegen.assess.conflict.plausibility import plausibility
@@ -21,8 +21,40 @@ from bridgegen.scenario.language.reader import load, shipped_text
 from bridgegen.simulation.choice import SimulatorChoice
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
-TEXT = shipped_text("platoon").decode().replace("duration: 20.0", "duration: 6.0")
-FIRST = TEXT[TEXT.index("  first:\n") : TEXT.index("  lead:\n")]
+FIRST = """\
+  first:
+    type: car
+    driver: ego
+    start: {distance: first_at}
+    end: {distance: 780.0}
+    speed: ego_speed
+"""
+AHEAD = """\
+  gap_ahead:
+    axis: participants
+    unit: m
+    low: 12.0
+    high: 60.0
+    default: 40.0
+    description: From the lead car's rear to the front of the first test vehicle at the start.
+    source: "As for gap."
+"""
+AT = """\
+derived:
+  first_at:
+    axis: participants
+    unit: m
+    value: 50 + gap + 4.6
+    description: Where the first test vehicle starts.
+    why: Between two equal cars the reference points are a length farther apart than the bumpers.
+    source: "As for gap."
+"""
+TEXT = shipped_text("lead-brakes").decode().replace("duration: 20.0", "duration: 6.0")
+TEXT = TEXT[: TEXT.index("recorded:")] + TEXT[TEXT.index("objective:") :]
+TEXT = TEXT.replace("value: 50 + gap + 4.6", "value: first_at + gap_ahead + 4.6")
+TEXT = TEXT.replace("  lead:\n", FIRST + "  lead:\n").replace("derived:\n", AT)
+TEXT = TEXT.replace("  deceleration:\n    axis", AHEAD + "  deceleration:\n    axis")
+"""A platoon: the ego follows a second vehicle of its driver, which follows a car that brakes."""
 MOTION = ("x", "y", "h", "v", "a")
 
 
@@ -120,6 +152,18 @@ def test_a_row_fails_if_a_further_vehicle_does_and_says_which(made):
     assert {*trials.findings.partner[hit]} == {"lead"}
 
 
+def test_where_both_fail_it_is_the_conflict_of_the_one_responsible():
+    scenario = load("two-at-crossroads")
+    pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego="route-follower"))
+    rollout = pipeline.rollout(rows(pipeline, 40))
+    found = analyse(rollout)
+    hit = found.kind[:, 1] == CONTACT
+    assert hit.sum() > 5
+    assert (found.body[hit, 1] == 1).all()  # it turned left across the ego's path
+    assert (found.responsible[hit, 1] == Responsible.EGO).all()
+    assert (rollout.egos[0].n_steps <= rollout.n_steps).all()
+
+
 @pytest.mark.parametrize("ego", ["reference", f"{EXAMPLES / 'my_driver.py'}:MyDriver"])
 def test_a_row_is_the_same_in_any_batch(made, ego):
     pipeline = made(ego)
@@ -182,6 +226,6 @@ def test_what_cannot_be_driven_is_refused(made):
         made(text=TEXT.replace("    participant: lead", "    participant: first"))
     with refuses(InputError, "first", "one vehicle"):
         made("connect:localhost:4711")
-    with refuses(InputError, "first", "embedded"):
-        scenario = load("platoon")
+    with refuses(InputError, "other", "embedded"):
+        scenario = load("two-at-crossroads")
         Pipeline(scenario, scenario.space(), simulator=SimulatorChoice("esmini"))

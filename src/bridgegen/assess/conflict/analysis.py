@@ -213,6 +213,10 @@ def _of_all(rollout: Rollout, judge: Callable[[Rollout], Conflicts]) -> Conflict
         e = rollout.names.index(view.names[0])
         mine, its = harm_of_pairs(found), harm_of_pairs(part)
         worse = (its > mine) | ((its == mine) & (part.kind > found.kind))
+        # Where both have failed towards each other, it is the conflict of the one responsible.
+        both = (found.at_fault & part.at_fault)[:, e]
+        blamed = [(one.responsible == Responsible.EGO)[:, e] for one in (found, part)]
+        worse[:, e] = np.where(both & (blamed[0] != blamed[1]), blamed[1], worse[:, e])
         pairs: dict[str, Any] = {
             item.name: np.where(worse, getattr(part, item.name), array)
             for item in fields(found)
