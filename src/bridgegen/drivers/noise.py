@@ -37,23 +37,10 @@ def noise_key(values: Mapping[str, npt.ArrayLike], n_rows: int) -> npt.NDArray[n
         column = np.broadcast_to(np.asarray(values[name], dtype=np.float64), n_rows)
         # Adding 0.0 makes 0.0 of −0.0, which is equal and has other bits.
         bits = (as_float(name, column, (n_rows,)) + 0.0).view(np.uint64)
-        key = _mix(_mix(key ^ _word(name)) + bits)
+        digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
+        word = np.frombuffer(digest, dtype="<u8").astype(np.uint64)
+        key = _mix(_mix(key ^ word) + bits)
     return key
-
-
-def key_of_another(key: npt.NDArray[np.uint64], name: str) -> npt.NDArray[np.uint64]:
-    """Return the keys ``(N,)`` of another vehicle's random numbers: sensors err independently.
-
-    Args:
-        key: ``(N,)`` uint64 of the rows, those of the ego.
-        name: of the vehicle.
-    """
-    return _mix(key ^ _word(name))
-
-
-def _word(name: str) -> npt.NDArray[np.uint64]:
-    digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
-    return np.frombuffer(digest, dtype="<u8").astype(np.uint64)
 
 
 def _mix(word: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:

@@ -89,7 +89,7 @@ class Trials:
         place = np.full(n, "", dtype=object)
         rows = np.arange(n)
         other = decisive(conflicts, count)[0]
-        instant, vehicle = conflicts.instant[rows, other], conflicts.parties(other)[0]
+        instant, vehicle = conflicts.instant[rows, other], conflicts.parties(rows, other)[0]
         front = rollout.box[vehicle, 2] + 0.5 * rollout.box[vehicle, 0]
         h = rollout.h[rows, vehicle, instant]
         x = rollout.x[rows, vehicle, instant] + front * elementary.cos(h)
@@ -102,8 +102,8 @@ class Trials:
             way, junctions = there.way(p, 0), there.in_junctions(p)
             place[at] = place_on_route(way, step, junctions, x[at], y[at])
             if e:  # so that modes say whose they are
-                said = f"on the route of {rollout.names[e]}"
-                place[at] = [f"{said}, {text}" if text else said for text in place[at]]
+                said = f"on the route of {rollout.names[e]}, "
+                place[at] = [f"{said}{text}".rstrip(", ") for text in place[at]]
         worth, severity = (np.where(ok, values[:, k], 0.0) for k in range(2))
         bad = values[:, 0] >= NEAR_MISS
         until = np.where(bad, instant, np.where(gate.instant < 0, np.inf, gate.instant))

@@ -332,15 +332,15 @@ def _conflict(conflicts: Conflicts, row: int, count: Count) -> Conflict | None:
     if summary is None:
         return None
     other = int(decisive(conflicts, count)[0][row])
-    vehicle, partner = conflicts.parties(np.full(len(conflicts.kind), other))
+    vehicle, partner = conflicts.parties(row, other)
     instant = int(conflicts.instant[row, other])
     zones = [Zone(int(a[row, other])) for a in (conflicts.zone_ego, conflicts.zone_other)]
     if conflicts.left_hand:
         zones = [zone.other_side for zone in zones]
     return Conflict(
         summary=summary,
-        partner=int(partner[row]),
-        vehicle=int(vehicle[row]),
+        partner=int(partner),
+        vehicle=int(vehicle),
         instant=instant,
         decided=int(conflicts.decided[row, other]) if summary.happened else instant,
         zones=(int(zones[0]), int(zones[1])),

@@ -206,10 +206,9 @@ class SimulatorChoice:
                 f"{self.name} moves the ego in its own way (--vehicle {KINEMATIC})"
             )
         if embedded.partners and self.name != EMBEDDED.name:
-            names = ", ".join(partner.program.names[0] for partner in embedded.partners)
+            place = embedded.program.place
             raise InputError(
-                f"{embedded.program.place}: the ego's driver drives {names}, too, which only the "
-                f"embedded simulator runs, got {self.name}"
+                f"{place}: several egos run in the embedded simulator, got {self.name}"
             )
         if storyboard.left_hand and self.name not in _OURS:
             raise InputError(

@@ -112,11 +112,11 @@ def test_two_that_change_places_change_motion_and_verdicts(made, ego, ideal):
     assert np.array_equal(decisive(found)[1], decisive(other)[1])
     column = decisive(found)[0]
     assert np.array_equal(column, decisive(other)[0])  # both have the lead, or each other
-    mine, its = found.parties(column)[0], other.parties(column)[0]
+    at = np.arange(len(X)), column
+    mine, its = found.parties(at[0], column)[0], other.parties(at[0], column)[0]
     course = decisive(found)[1] >= COURSE  # else both merely come as near to each other
     assert np.array_equal(mine[course], 1 - its[course])
     for name in ("kind", "type", "responsible", "rule", "instant", "severity", "ttc", "v_ego"):
-        at = np.arange(len(X)), column
         assert np.array_equal(getattr(found, name)[at], getattr(other, name)[at])
 
 
@@ -142,7 +142,9 @@ def test_a_row_fails_if_a_further_vehicle_does_and_says_which(made):
     other, harm = decisive(found)
     hit = np.flatnonzero(harm >= NEAR_MISS)
     assert (found.kind[hit, 2] == CONTACT).any()
-    assert (found.parties(other)[0][hit] == 1).all()  # it hits the lead first; the ego follows it
+    assert (
+        found.parties(np.arange(len(X)), other)[0][hit] == 1
+    ).all()  # it hits the lead first; the ego follows it
     assert (plausibility(rollout).code == 0).all()  # its contact is no implausible traffic
     summary = summarise(found, int(hit[0]))
     assert (summary.vehicle, summary.partner) == ("first", "lead")
@@ -184,28 +186,6 @@ def test_sensors_of_two_vehicles_err_independently(made):
     assert (seen != its).any()
 
 
-def test_a_user_s_compiled_driver_drives_them_as_it_drives_one(made, tmp_path):
-    source = tmp_path / "compiled.py"
-    source.write_text(
-        "from bridgegen.drivers.compiled import compiled_driver\n\n"
-        "@compiled_driver(memory=1)\n"
-        "def drive(scene, ego, route, tracks, memory):\n"
-        "    memory[0] += 1.0\n"
-        "    return (ego.target_speed - ego.v) / 0.5 - 0.01 * memory[0], 0.0\n",
-        "utf-8",
-    )
-    both = made(f"{source}:drive")
-    scripted = made(f"{source}:drive", TEXT.replace("    driver: ego\n", ""))
-    X = rows(both, 3)
-    rollout = both.rollout(X)
-    assert (rollout.status == 0).all()
-    for name in MOTION:  # it sees nobody: alone, where the rollout calls it, it drives the same
-        assert np.array_equal(
-            getattr(rollout, name)[:, 0], getattr(scripted.rollout(X), name)[:, 0]
-        )
-    np.testing.assert_allclose(rollout.v[:, 0], rollout.v[:, 1], atol=1e-9)
-
-
 def test_an_exported_file_gives_the_same_bits(made, tmp_path):
     pipeline = made("reference")
     X = rows(pipeline, 2)
@@ -225,7 +205,11 @@ def test_what_cannot_be_driven_is_refused(made):
     with refuses(ScenarioError, "under test"):
         made(text=TEXT.replace("    participant: lead", "    participant: first"))
     with refuses(InputError, "first", "one vehicle"):
-        made("connect:localhost:4711")
-    with refuses(InputError, "other", "embedded"):
+        remote = made("connect:localhost:4711")
+        remote.rollout(rows(remote, 1))
+    with refuses(InputError, "first", "one vehicle"):
+        compiled = made(f"{EXAMPLES / 'my_compiled_driver.py'}:drive")
+        compiled.rollout(rows(compiled, 1))
+    with refuses(InputError, "several egos", "esmini"):
         scenario = load("two-at-crossroads")
         Pipeline(scenario, scenario.space(), simulator=SimulatorChoice("esmini"))

@@ -97,9 +97,8 @@ class Conflicts:
             lanes, or the edge of the road, at most, left positive; of a close pass the clearance;
             else 0.
         breach: ``(N, E)`` in [0, 1], of a violation: 1 where it is a failure; else 0.
-        body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own; or the further
-            vehicle that the ego's driver drives, whose conflict is the worse one. Its conflict with
-            the ego is in its own column.
+        body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own; or of which
+            further vehicle of its driver, whose conflict with the ego is in its own column.
         driven: the numbers of these vehicles.
         left_hand: whether it happened in the mirror image of left-hand traffic.
         country: by whose law it is judged, a code of ISO 3166-1; "" where none is stated.
@@ -140,17 +139,9 @@ class Conflicts:
     country: str = ""
     driven: tuple[int, ...] = ()
 
-    def parties(self, other: Int) -> tuple[Int, Int]:
-        """Return whose conflict the one in a column of each row is, and with whom.
-
-        Args:
-            other: ``(N,)`` the columns.
-
-        Returns:
-            ``(N,)`` numbers of the driven vehicle and of the other participant; they are equal
-            where there is none.
-        """
-        body = self.body[np.arange(len(other)), other]
+    def parties(self, rows: Int | int, other: Int | int) -> tuple[Int, Int]:
+        """Return whose conflict is in a column of rows, and with whom; equal: with no one."""
+        body = self.body[rows, other]
         vehicle = np.where(np.isin(body, self.driven), body, 0)
         return vehicle, np.where(other == 0, vehicle, np.where(other == vehicle, 0, other))
 
@@ -198,19 +189,16 @@ def _of_all(rollout: Rollout, judge: Callable[[Rollout], Conflicts]) -> Conflict
         return judge(rollout)
     from bridgegen.assess.conflict.harm import harm_of_pairs  # which imports this module
 
-    touches = [np.any(view.distance <= 0.0, axis=1) for view in (rollout, *rollout.egos)]
-    firsts = [np.where(each.any(axis=1), each.argmax(axis=1), each.shape[1]) for each in touches]
-    end = np.min(firsts, axis=0)
+    views, n = (rollout, *rollout.egos), rollout.shape[2] + 1
+    touches = [np.any(view.distance <= 0.0, axis=1) for view in views]
+    firsts = [np.where(each.any(axis=1), each.argmax(axis=1), n) for each in touches]
+    first = np.min(firsts, axis=0)
     found, *parts = (
-        judge(
-            replace(
-                view, n_steps=np.where(end < own, np.minimum(end + 1, view.n_steps), view.n_steps)
-            )
-        )
-        for view, own in zip((rollout, *rollout.egos), firsts, strict=True)
+        judge(replace(view, n_steps=np.minimum(view.n_steps, np.where(first < own, first + 1, n))))
+        for view, own in zip(views, firsts, strict=True)
     )
-    for view, part in zip(rollout.egos, parts, strict=True):
-        e = rollout.names.index(view.names[0])
+    for part in parts:
+        e = rollout.names.index(part.names[0])
         mine, its = harm_of_pairs(found), harm_of_pairs(part)
         worse = (its > mine) | ((its == mine) & (part.kind > found.kind))
         # Where both have failed towards each other, it is the conflict of the one responsible.

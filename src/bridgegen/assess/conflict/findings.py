@@ -104,7 +104,7 @@ class Findings:
         # A collision course that came to nothing has nobody responsible.
         serious = conflicts.kind[rows, other] >= NEAR_MISS
         names = np.array(conflicts.names, dtype=object)
-        vehicle, partner = conflicts.parties(other)
+        vehicle, partner = conflicts.parties(rows, other)
         met = (conflicts.kind[rows, other] >= COURSE) & (partner != vehicle)
         return cls(
             words(conflicts.kind, [KINDS.get(kind, "") for kind in range(VIOLATION + 1)]),

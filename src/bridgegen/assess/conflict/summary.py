@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, Self
 
-import numpy as np
-
 from bridgegen.assess.conflict._limits import HORIZON
 from bridgegen.assess.conflict.analysis import (
     CONTACT,
@@ -79,21 +77,7 @@ def sentence(conflicts: Conflicts, row: int, other: int) -> str:
         raise IndexError(
             f"row must be 0 to {n - 1} and other 0 to {e - 1}, got row={row}, other={other}"
         )
-    vehicle, partner = _parties(conflicts, row, other)
-    name = f"'{conflicts.names[partner]}'"
-    said = _sentence(conflicts, row, other, name)
-    # Of several egos each is called by its name.
-    return re.sub(r"\b([Tt]he ego)\b", rf"\1 {conflicts.names[vehicle]}", said) if vehicle else said
-
-
-def _parties(conflicts: Conflicts, row: int, other: int) -> tuple[int, int]:
-    """Return whose conflict it is, and with whom; equal of a departure."""
-    columns = np.full(len(conflicts.kind), other)
-    vehicle, partner = conflicts.parties(columns)
-    return int(vehicle[row]), int(partner[row])
-
-
-def _sentence(conflicts: Conflicts, row: int, other: int, name: str) -> str:
+    name = f"'{conflicts.names[conflicts.parties(row, other)[1]]}'"
     kind = conflicts.kind[row, other]
     if kind == NO_CONFLICT:
         return ""
@@ -122,7 +106,7 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
     closing = conflicts.closing_normal[row, other]
     own = Zone(int(conflicts.zone_ego[row, other])).label
     mine, whole = f"ego's {own}", "the ego"
-    if conflicts.body[row, other] > 0 and not _parties(conflicts, row, other)[0]:
+    if conflicts.body[row, other] > 0 and not conflicts.parties(row, other)[0]:
         mine, whole = f"{own} of the ego's trailer", "the ego's trailer"
     its = Zone(int(conflicts.zone_other[row, other])).label
     kind = ConflictType(int(conflicts.type[row, other]))
@@ -368,7 +352,10 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
     kind = int(conflicts.kind[row, other])
     rule = Rule(conflicts.rule[row, other])
     happened = kind >= NEAR_MISS
-    vehicle, partner = _parties(conflicts, row, other)
+    vehicle, partner = conflicts.parties(row, other)
+    said = sentence(conflicts, row, other)
+    if vehicle:  # of several egos each is called by its name
+        said = re.sub(r"\b([Tt]he ego)\b", rf"\1 {conflicts.names[vehicle]}", said)
     sort = ConflictType(conflicts.type[row, other])
 
     def number(name: str) -> float:
@@ -394,7 +381,7 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
     }
     found = ConflictSummary(
         conflict=KINDS[kind],
-        sentence=sentence(conflicts, row, other),
+        sentence=said,
         avoidance=avoidance(conflicts, row, other),
         partner=conflicts.names[partner] if partner != vehicle else "",
         vehicle=conflicts.names[vehicle] if vehicle else "",

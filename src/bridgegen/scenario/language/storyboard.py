@@ -395,18 +395,10 @@ class Storyboard:
                 place,
             )
         elif driver == EGO:
-            fits = PARTICIPANTS[given.type]
-            if (
-                fits.seen_as.conduct != "vehicle"
-                or fits.on_rails
-                or given.path
-                or not (given.end or given.places)
-            ):
-                self._report(
-                    f"the ego's driver drives vehicles that have a start and an end on lanes, as "
-                    f"the ego has; {name} is of type {given.type}",
-                    place,
-                )
+            kind, has_route = PARTICIPANTS[given.type], given.end or given.places
+            if kind.seen_as.conduct != "vehicle" or kind.on_rails or given.path or not has_route:
+                why = "the ego's driver drives vehicles that have a start and an end on lanes"
+                self._report(f"{why}; {name} is of type {given.type}", place)
         elif driver not in DRIVERS:
             hint = nearest(driver, DRIVERS)
             self._report(

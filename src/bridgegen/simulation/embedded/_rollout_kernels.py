@@ -105,9 +105,13 @@ def move_driven_rows(k, demanded, curvature, plan, networks, rows, states, recor
 
 
 @kernel
-def take_rows(k, driven, plan, networks, rows, states, records):
-    """Move entities of the rows that still run as ``driven`` ``(N, B, 8)`` says; see `take`."""
+def move_others_rows(k, driven, plan, networks, rows, states, records):
+    """Move all but the egos of the rows that still run on from instant k, or end them.
+
+    ``driven`` ``(N, B, 8)``: other vehicles with drivers as `take` has it, and their numbers.
+    """
     plan = bundled(plan)
+    after = min(k + 1, records.x.shape[2] - 1)
     for i in range(len(rows)):
         if states.ending[i, N_STEPS] == 0:
             roads = bundled_row(networks, rows[i])
@@ -116,16 +120,5 @@ def take_rows(k, driven, plan, networks, rows, states, records):
                 e = int(driven[i, b, 7])
                 if state.given[e]:
                     take(e, k, driven[i, b], roads, state, record)
-
-
-@kernel
-def move_others_rows(k, plan, networks, rows, states, records):
-    """Move all but the egos of the rows that still run on from instant k, or end them."""
-    plan = bundled(plan)
-    after = min(k + 1, records.x.shape[2] - 1)
-    for i in range(len(rows)):
-        if states.ending[i, N_STEPS] == 0:
-            roads = bundled_row(networks, rows[i])
-            state, record = bundled_row(states, i), bundled_row(records, i)
             x, y, h = record.x[0, after], record.y[0, after], record.h[0, after]
             move_others(k, x, y, h, plan, roads, state, record)

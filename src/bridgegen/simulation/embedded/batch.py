@@ -107,10 +107,11 @@ class Batch:
         self._messages: dict[int, str] = {}
         self._has_addresses = False
 
-    def pieces(self) -> tuple[Float, Int]:
-        """Return the pieces of the rows' maps, ``(P, K, ·)`` as `PIECE` has them, and whose."""
-        used, of = np.unique(self._rows, return_inverse=True)
-        return self._roads.tables.pieces[used], of.reshape(-1)
+    @property
+    def pieces(self) -> Float:
+        """The pieces of the first row's map, ``(K, ·)`` as `PIECE` has them."""
+        pieces: Float = self._roads.tables.pieces[self._rows[0]]
+        return pieces
 
     @property
     def running(self) -> Bool:
@@ -185,7 +186,7 @@ class Batch:
             array[...] = 0
         self.record.x[:, :, :] = FAR_APART * np.arange(self.record.x.shape[1])[:, np.newaxis]
         self.state.ending[:, memory.N_STEPS] = self.record.x.shape[2]
-        return self.rollout()
+        return Batch.rollout(self)
 
     def kinds(self) -> tuple[Any, ...]:
         """Return the types of what kernels of a row take: plan, roads, state and record."""

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from bridgegen.base.errors import InputError
 from bridgegen.drivers import Driver
 from bridgegen.drivers._weather_columns import WEATHER
 from bridgegen.drivers.address import is_remote
-from bridgegen.drivers.noise import key_of_another
+from bridgegen.drivers.noise import noise_key
 from bridgegen.drivers.user_drivers import Traits
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -143,15 +144,9 @@ class EmbeddedSimulator:
         self.program = compiled(skipped=skipped)
         self.partners: tuple[EmbeddedSimulator, ...] = ()
         for e in self.program.tested.tolist():
-            partner = EmbeddedSimulator.__new__(EmbeddedSimulator)
-            partner.program = compiled(ego=e, skipped=None if skipped is None else [])
-            partner.partners = ()
+            partner = copy(self)
+            partner.program, partner.partners = compiled(ego=e, skipped=skipped and []), ()
             self.partners += (partner,)
-        if self.partners and is_remote(self.program.driver.spec):
-            raise InputError(
-                f"{place}: the driver '{self.program.driver.name}' in another process drives one "
-                f"vehicle, this scenario has it drive {self.partners[0].program.names[0]}, too"
-            )
 
     def __getstate__(self) -> dict[str, Any]:
         """Another process has the same storyboard, and processes of its own for a user's driver."""
@@ -214,9 +209,7 @@ class EmbeddedSimulator:
     ) -> Network:
         """See `Simulator`: each entity's route, planned and sampled."""
         network = Network(self.program, models, courses)
-        network.partners = tuple(
-            Network(partner.program, models, courses) for partner in self.partners
-        )
+        network.partners = tuple(each.roads(models, courses) for each in self.partners)
         return network
 
     def run(
@@ -287,6 +280,12 @@ class EmbeddedSimulator:
         **how: Any,
     ) -> "Callable[[Int], Batch]":
         """Return what sets up some of the rows for the user's driver."""
+        spec, others = self.program.driver.spec, [each.program.names[0] for each in self.partners]
+        if others and (is_remote(spec) or self._own.traits.memory is not None):
+            raise InputError(
+                f"the driver '{spec}' drives one vehicle ({', '.join(others)} would be another): "
+                "one that drives several ships, or is a class in Python or a co-simulation unit"
+            )
         traits = self._own.traits
         for network in (roads, *roads.partners):
             network.provide(traits.wants)
@@ -426,16 +425,15 @@ class EmbeddedSimulator:
         program = self.program.changed(driver=driver, dry=dry, kinematic=kinematic)
         if not self.partners:
             return Batch(program, roads, rows, values, own, noise, until_collision)
-        from bridgegen.simulation.embedded.together import Partner, Together
+        from bridgegen.simulation.embedded.together import Together
 
         keys = self.noise_keys(values, len(rows)) if noise is None else noise
         found = []
         for simulator, network in zip(self.partners, roads.partners, strict=True):
             there = simulator.program.changed(driver=driver, dry=dry, kinematic=kinematic)
-            name, wheel = there.names[0], None
-            other = Batch(there, network, rows, values, own, key_of_another(keys, name))
-            if own is not None:
-                wheel = partial(simulator._own.wheel, there)
-            found.append(Partner(self.program.names.index(name), other, wheel))
+            its = keys ^ noise_key({there.names[0]: 0.0}, 1)  # sensors err independently
+            other = Batch(there, network, rows, values, own, its)
+            wheel = partial(getattr, other, "demand")
+            found.append((other, partial(simulator._own.wheel, there, other) if own else wheel))
         # A row in which one vehicle collides goes on for the other.
         return Together(found, program, roads, rows, values, own, keys)

@@ -267,8 +267,7 @@ def impose_rows(k, bodies, imposed, plan, networks, rows, states, records):
 def take(e, k, driven, roads, state, record):
     """Move entity e on from instant k as its driver has in the rollout whose ego it is.
 
-    ``driven`` is its next x, y [m], h [rad] and v [m/s]; its acceleration [m/s²]; how far it has
-    come [m], and for how long it has stood [s].
+    ``driven``: its next x, y, h and v; acceleration, metres travelled, and seconds that it stood.
     """
     step = driven[5] - state.travelled[e]
     record.a[e, k], state.travelled[e], state.stood[e] = driven[4], driven[5], driven[6]

@@ -6,7 +6,6 @@ that it cannot drive. So a failure costs the row that it belongs to, whatever th
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,7 +43,6 @@ def drive_in_lock_step(
     driver: DriverProcess,
     is_stopped: Callable[[], bool] = lambda: False,
     note: Callable[[Int], Note] | None = None,
-    ask: Callable[[Batch, int], tuple[Float, Float]] | None = None,
 ) -> Rollout:
     """Roll out rows 0 … n − 1 with a user's driver.
 
@@ -56,7 +54,6 @@ def drive_in_lock_step(
         is_stopped: returns whether it has been stopped from elsewhere.
         note: returns what takes the plans of some of the rows. Where the driver fails, rows are
             driven again.
-        ask: asks the driver at an instant, if it is no class in Python.
 
     Raises:
         DriverError: it has been stopped.
@@ -69,8 +66,7 @@ def drive_in_lock_step(
         rows = waiting.pop()
         batch = setup(rows)
         try:
-            wheel = partial(ask, batch) if ask else None
-            _together(program, batch, driver, note(rows) if note else None, wheel)
+            _together(program, batch, driver, note(rows) if note else None)
         except DriverError as error:
             if is_stopped():
                 raise
@@ -93,13 +89,7 @@ def _batches(n: int, most: int | None) -> list[Int]:
     return [np.arange(at, min(at + most, n)) for at in range(0, n, most)][::-1]
 
 
-def _together(
-    program: Program,
-    batch: Batch,
-    driver: DriverProcess,
-    note: Note | None,
-    ask: Callable[[int], tuple[Float, Float]] | None,
-) -> None:
+def _together(program: Program, batch: Batch, driver: DriverProcess, note: Note | None) -> None:
     """Drive a batch from its first instant to its last.
 
     Raises:
@@ -108,12 +98,12 @@ def _together(
     batch.start()
     if not batch.running.any():
         return
-    demand = ask or Wheel(program, batch, driver, note).demand
+    wheel = Wheel(program, batch, driver, note)
     for k in range(program.n_steps):
         if not batch.running.any():
             return
         batch.before_driver(k)
-        batch.after_driver(k, *demand(k))
+        batch.after_driver(k, *wheel.demand(k))
 
 
 class Wheel:

@@ -86,11 +86,10 @@ class OwnDriver:
         Raises:
             InputError: the driver cannot be made.
         """
-        if self.traits.memory is None or program.tested.size:
+        if self.traits.memory is None:
             with self._turn:  # it is one, and has all rows at once
-                ask = partial(_ask, self._first.process) if self.traits.memory is not None else None
                 return drive_in_lock_step(
-                    program, setup, n, self._first.process, self._is_stopped.is_set, ask=ask
+                    program, setup, n, self._first.process, self._is_stopped.is_set
                 )
         with self._lock:
             # A process for each thread that drives at the same time: a compiled loop cannot be
@@ -147,7 +146,7 @@ class OwnDriver:
         return found
 
     def wheel(self, program: Program, batch: Batch) -> Callable[[int], tuple[Float, Float]]:
-        """Return what asks the driver at an instant of a batch that has started.
+        """Return what asks the driver at an instant of a batch of one row that has started.
 
         Raises:
             InputError: the driver cannot be made.
@@ -257,36 +256,32 @@ def _drive(
 
 
 def _ask(process: DriverProcess, batch: Batch, k: int) -> tuple[Float, Float]:
-    """Ask a compiled driver at one instant of all rows that run.
+    """Ask a compiled driver at one instant of one row.
 
     Raises:
         DriverError: it failed.
     """
     batch.fill_inputs(k)
-    state, rows = batch.state, np.flatnonzero(batch.running)
-    pieces, which = batch.pieces()
-    answers, memory, raised = process.call(
+    state = batch.state
+    answer, memory, raised = process.call(
         _answer,
-        rows,
-        pieces,
-        which,
-        state.inputs,
-        state.ahead,
-        state.others,
-        state.mind,
-        state.lanes,
-        state.place,
-        state.signals,
-        state.conflicts,
-        state.tracked,
+        state.inputs[0],
+        state.ahead[0],
+        state.others[0],
+        state.mind[0],
+        state.lanes[0],
+        batch.pieces,
+        state.place[0],
+        state.signals[0],
+        state.conflicts[0],
+        state.tracked[0],
     )
-    for answer in answers[rows]:
-        if answer[RETURNED] == 0.0:
-            raise DriverError("raised", raised)
-        if problem := _not_finite(answer):
-            raise DriverError("answered nonsense", problem)
-    state.mind[...] = memory
-    return answers[:, ACCELERATION], answers[:, CURVATURE]
+    if answer[RETURNED] == 0.0:
+        raise DriverError("raised", raised)
+    if problem := _not_finite(answer):
+        raise DriverError("answered nonsense", problem)
+    state.mind[0] = memory
+    return answer[[ACCELERATION]], answer[[CURVATURE]]
 
 
 def _not_finite(answer: Float) -> str | None:
@@ -329,21 +324,19 @@ def _simulate(
 
 
 def _answer(
-    address: int, rows: Int, pieces: Float, which: Int, inputs: Float, *given: Float
+    address: int, inputs: Float, ahead: Float, others: Float, memory: Float, *wanted: Float
 ) -> tuple[Float, Float, str]:
-    """Ask the driver in some rows; return its answers, what it keeps, and what it raised."""
-    answers = np.zeros((len(inputs), ANSWER))
-    ahead, others, memory, lanes, *more = given
+    """Ask the driver; return its answer, what it keeps, and what it raised."""
+    answer = np.zeros(ANSWER)
     raised: list[str] = []
     sys.unraisablehook = lambda error: raised.append(_described(error))
     try:
-        for i in rows:
-            first = inputs[i, EGO:], inputs[i, :EGO], ahead[i], others[i], memory[i], answers[i]
-            wanted = lanes[i], pieces[which[i]], *(array[i] for array in more)
-            call_from_python(address, (*first, *wanted))
+        call_from_python(
+            address, (inputs[EGO:], inputs[:EGO], ahead, others, memory, answer, *wanted)
+        )
     finally:
         sys.unraisablehook = sys.__unraisablehook__
-    return answers, memory, "".join(raised)
+    return answer, memory, "".join(raised)
 
 
 def _described(unraisable: Any) -> str:
