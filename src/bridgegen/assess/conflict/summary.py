@@ -240,8 +240,7 @@ class ConflictSummary:
         harm: in [0, 1], as the row's, but of this conflict alone.
         aside: of a violation, see `Conflicts.aside` [m]; else 0.
         avoidance: the end of ``sentence`` that says whether braking would have avoided it.
-        vehicle: name of the further vehicle that the ego's driver drives, of whose conflict all
-            this is; "" of the ego's.
+        vehicle: name of the further vehicle of the driver whose conflict it is; "" of the ego's.
     """
 
     conflict: str

@@ -90,9 +90,6 @@ def after_drivers(k, demanded, curvature, plan, networks, rows, states, records)
             after_driver(k, demanded[i], curvature[i], plan, roads, state, record)
 
 
-# --- In two halves: where rollouts of one scenario, each with another ego, run together ----------
-
-
 @kernel
 def move_driven_rows(k, demanded, curvature, plan, networks, rows, states, records):
     """Move the egos of the rows that still run on from instant k; see `together`."""

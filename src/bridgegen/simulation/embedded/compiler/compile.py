@@ -183,7 +183,6 @@ class _Compiler:
         self.scenario = scenario
         self.place = place
         self.tables = Tables(scenario, place, ego)
-        self.ego = ego
         self.tables.fixed |= texts
         self.paths: list[PathSpec] = []
         self.positions = Positions(self.tables, int(str(scenario.file_header.rev_minor)))
@@ -331,7 +330,9 @@ class _Compiler:
             couplings=self.towing.couplings(),
             stands_apart=np.array(self.start.apart, dtype=np.int64),
             weathers=global_actions.environments.rows,
-            limits=limits_of(objects[self.ego], self.place),  # of the system, not of its body
+            limits=limits_of(
+                objects[self.tables.ego], self.place
+            ),  # of the system, not of its body
             values=np.array(global_actions.values.slots, dtype=np.int64),
             lights=tuple(signals.lights),
             first_states=np.array(signals.first_states, dtype=np.int8),
@@ -397,7 +398,7 @@ class _Compiler:
         for e, (name, body) in enumerate(zip(self.tables.names, objects, strict=True)):
             if e == 0:
                 continue
-            mine = e == self.ego  # the file's ego, in another's place
+            mine = e == self.tables.ego  # the file's ego, in another's place
             said = "ego" if mine else declared.other_driver(self.controllers, self.place, e, name)
             lacks = self._lacks_for_attention(e, body)
             if said == "ego" and not (lacks or IS_VEHICLE[kind(body)]):

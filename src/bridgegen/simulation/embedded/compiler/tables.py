@@ -32,7 +32,7 @@ class Tables:
     Attributes:
         place: the file, for messages.
         objects: its entities, the ego first.
-        owner: the entity whose controllers say what the system under test is: the file's ego.
+        ego: the number of the file's ego, whose controllers say what the system under test is.
         names: their names.
         parameters: the numeric parameters with their declared values.
         problems: what the rollout cannot do, a sentence each.
@@ -45,8 +45,8 @@ class Tables:
         self.place = place
         objects = scenario.entities.scenario_objects
         self.objects = sorted(objects, key=_rank)
-        self.owner = self.objects[0] if self.objects else None
-        if ego:  # another that the same driver drives: the two change places
+        self.ego = ego
+        if ego:  # another that the same driver drives is in its place
             self.objects[0], self.objects[ego] = self.objects[ego], self.objects[0]
         self._selections = {
             str(selection.name): selection for selection in scenario.entities.entity_selections
