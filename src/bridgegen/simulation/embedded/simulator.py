@@ -283,8 +283,8 @@ class EmbeddedSimulator:
         spec, others = self.program.driver.spec, [each.program.names[0] for each in self.partners]
         if others and (is_remote(spec) or self._own.traits.memory is not None):
             raise InputError(
-                f"the driver '{spec}' drives one vehicle ({', '.join(others)} would be another): "
-                "one that drives several ships, or is a class in Python or a co-simulation unit"
+                f"the driver '{spec}' drives one vehicle ({', '.join(others)} would be another); "
+                "drivers that ship, classes in Python and co-simulation units drive several"
             )
         traits = self._own.traits
         for network in (roads, *roads.partners):
