@@ -48,7 +48,7 @@ TIME_LIMIT = 10.0
 """Default time limit of one call of a user's driver [s]."""
 
 
-SCRIPTED, ATTENTIVE, INSISTENT, LAWFUL = 0, 1, 2, 3
+SCRIPTED, ATTENTIVE, INSISTENT, LAWFUL, TESTED = range(5)
 """Codes of the drivers of participants other than the ego."""
 
 CODES = {
@@ -56,6 +56,7 @@ CODES = {
     "attentive": ATTENTIVE,
     "insistent": INSISTENT,
     "lawful": LAWFUL,
+    "ego": TESTED,
 }
 """Codes of the drivers of participants other than the ego, by name."""
 

@@ -20,6 +20,7 @@ from bridgegen.assess.conflict import analysis, severity
 from bridgegen.assess.conflict.harm import Count
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
 from bridgegen.base.physics import DRY_FRICTION
 from bridgegen.drivers._weather_columns import FRICTION_SCALE, VISUAL_RANGE
 from bridgegen.drivers.kinds import CAR
@@ -170,6 +171,8 @@ BY_NAME: Mapping[str, Constant] = {constant.name: constant for constant in CONST
 
 def applying(program: Program) -> tuple[Constant, ...]:
     """Return the constants that a storyboard with its driver and vehicle depends on."""
+    if program.tested.size:
+        raise InputError(f"{program.place}: constants are varied where there is one ego")
     without = set()
     if not program.chassis.size:
         without.add("brake-lag")

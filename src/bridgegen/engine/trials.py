@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -88,17 +89,21 @@ class Trials:
         place = np.full(n, "", dtype=object)
         rows = np.arange(n)
         other = decisive(conflicts, count)[0]
-        instant = conflicts.instant[rows, other]
-        front = rollout.box[0, 2] + 0.5 * rollout.box[0, 0]
-        h = rollout.h[rows, 0, instant]
-        x = rollout.x[rows, 0, instant] + front * elementary.cos(h)
-        y = rollout.y[rows, 0, instant] + front * elementary.sin(h)
+        instant, vehicle = conflicts.instant[rows, other], conflicts.parties(rows, other)[0]
+        front = rollout.box[vehicle, 2] + 0.5 * rollout.box[vehicle, 0]
+        h = rollout.h[rows, vehicle, instant]
+        x = rollout.x[rows, vehicle, instant] + front * elementary.cos(h)
+        y = rollout.y[rows, vehicle, instant] + front * elementary.sin(h)
         wanted = ok & np.isin(findings.conflict, list(KINDS.values()))
-        for p in np.unique(which[wanted]).tolist():
-            at = np.flatnonzero(wanted & (which == p))
-            step = float(roads.tables.steps[p, 0])
-            way, junctions = roads.way(p, 0), roads.in_junctions(p)
+        networks = {0: roads, **dict(zip(conflicts.driven, roads.partners, strict=True))}
+        for (e, there), p in product(networks.items(), np.unique(which[wanted]).tolist()):
+            at = np.flatnonzero(wanted & (which == p) & (vehicle == e))
+            step = float(there.tables.steps[p, 0])
+            way, junctions = there.way(p, 0), there.in_junctions(p)
             place[at] = place_on_route(way, step, junctions, x[at], y[at])
+            if e:  # so that modes say whose they are
+                said = f"on the route of {rollout.names[e]}, "
+                place[at] = [f"{said}{text}".rstrip(", ") for text in place[at]]
         worth, severity = (np.where(ok, values[:, k], 0.0) for k in range(2))
         bad = values[:, 0] >= NEAR_MISS
         until = np.where(bad, instant, np.where(gate.instant < 0, np.inf, gate.instant))

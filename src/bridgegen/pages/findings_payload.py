@@ -66,6 +66,7 @@ def conflict_payload(conflict: Conflict, cause: str = "") -> dict[str, Any]:
             for name, v in numbers.items()
         },
         "partner_number": conflict.partner,
+        **({"vehicle_number": conflict.vehicle} if conflict.vehicle else {}),
         "instant": conflict.instant,
         "decided": conflict.decided,
         "zones": list(conflict.zones),

@@ -75,6 +75,11 @@ class Film:
         gap = self.playback.distance[: self.playback.n_steps]
         return first_closest(gap) if np.isfinite(gap).any() else 0
 
+    @property
+    def vehicle(self) -> int:
+        """The ego, or the further vehicle of its driver whose conflict it is."""
+        return self.playback.conflict.vehicle if self.playback.conflict else 0
+
     @cached_property
     def partner(self) -> int:
         """The other participant of the conflict, or the nearest one; 0 if there is none."""
@@ -86,13 +91,13 @@ class Film:
 
     @cached_property
     def _pair(self) -> Float:
-        return self.centres[[0, self.partner]]
+        return self.centres[[self.vehicle, self.partner]]
 
     @cached_property
     def _players(self) -> list[int]:
         p = self.playback
         moves = [e for e in range(1, len(p.entities)) if (p.v[e, : p.n_steps] > MOVES).any()]
-        return list(dict.fromkeys([0, *moves, self.partner]))
+        return list(dict.fromkeys([0, self.vehicle, *moves, self.partner]))
 
     def contact(self, k: int) -> Point | None:
         """Return where the first contact was in the picture at instant k [pixels], if it was."""
@@ -110,7 +115,8 @@ class Film:
         k = int(hits[0])
         view = View(SvgDraw(self._big, GROUND), self._camera(k))
         ego, other = (
-            view.corners(self.playback.entities[e], self._poses[e, k]) for e in (0, self.partner)
+            view.corners(self.playback.entities[e], self._poses[e, k])
+            for e in (self.vehicle, self.partner)
         )
         # Points on all edges: the cross stands between the two that are nearest, wherever the
         # bodies touch.

@@ -190,10 +190,11 @@ class Conflict:
 
     Attributes:
         summary: what happened, with all figures.
-        partner: number of the other participant.
+        partner: number of the other participant; of a departure that of the vehicle itself.
         instant: of contact, or of the least time to collision.
         decided: instant at which the risk arose that decides on responsibility.
         zones: of the ego and of the other, `bridgegen.assess.conflict.types.Zone` each.
+        vehicle: number of the ego, or of the further vehicle of its driver whose conflict it is.
     """
 
     summary: ConflictSummary
@@ -201,6 +202,7 @@ class Conflict:
     instant: int
     decided: int
     zones: tuple[int, int]
+    vehicle: int = 0
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from bridgegen.assess.cause import Cause
 from bridgegen.assess.conflict.analysis import Conflicts, analyse
-from bridgegen.assess.conflict.harm import Count
+from bridgegen.assess.conflict.harm import Count, decisive
 from bridgegen.assess.conflict.outcomes import with_outcomes
 from bridgegen.assess.conflict.summary import summarise
 from bridgegen.assess.conflict.types import Zone
@@ -277,12 +277,15 @@ def _played(
     conflicts = analyse(rollout)
     entities = bodies(rollout, pipeline.runner.bodies(shown[0].x))
     scenery = Scenery(pipeline.runner)
-    nearest = rollout.distance.min(axis=1)
+    nearest = {0: rollout.distance.min(axis=1)} | {
+        rollout.names.index(view.names[0]): view.distance.min(axis=1) for view in rollout.egos
+    }
     ttc, detections = ttc_over_time(rollout), sensed(seen)
     shows = vehicle_lamps(seen, pipeline.runner.embedded.program.sirens)
     checked = constraints_in_words(pipeline.runner.source.constraints)
     found = []
     for k, item in enumerate(shown):
+        conflict = _conflict(conflicts, k, count)
         concrete = pipeline.runner.concrete(item.x) if not brief else None
         motion = {name: getattr(seen, name)[k] for name in "xyhva"}
         if rollout.present.size:  # who is not there has no place and no speed
@@ -303,7 +306,7 @@ def _played(
                 time_step=rollout.time_step,
                 entities=entities,
                 **motion,
-                distance=nearest[k],
+                distance=nearest[conflict.vehicle if conflict else 0][k],
                 ttc=ttc[k],
                 lanes=road.outlines,
                 n_steps=int(rollout.n_steps[k]),
@@ -316,7 +319,7 @@ def _played(
                 plans=_plans(replay, k),
                 weather=tuple(_weather(step, weather) for step, weather in replay.weathers[k]),
                 street_lights=road.street_lights,
-                conflict=_conflict(conflicts, k, count),
+                conflict=conflict,
                 shows=shows[k],
             )
         )
@@ -328,14 +331,16 @@ def _conflict(conflicts: Conflicts, row: int, count: Count) -> Conflict | None:
     summary = summarise(conflicts, row, count)
     if summary is None:
         return None
-    other = conflicts.names.index(summary.partner or conflicts.names[0])
+    other = int(decisive(conflicts, count)[0][row])
+    vehicle, partner = conflicts.parties(row, other)
     instant = int(conflicts.instant[row, other])
     zones = [Zone(int(a[row, other])) for a in (conflicts.zone_ego, conflicts.zone_other)]
     if conflicts.left_hand:
         zones = [zone.other_side for zone in zones]
     return Conflict(
         summary=summary,
-        partner=other,
+        partner=int(partner),
+        vehicle=int(vehicle),
         instant=instant,
         decided=int(conflicts.decided[row, other]) if summary.happened else instant,
         zones=(int(zones[0]), int(zones[1])),

@@ -201,20 +201,20 @@ def _thumbnail(playback: Playback, caption: str, entry: str, ego: str) -> Thumbn
     there = np.asarray(np.isfinite(poses).all(axis=-1))  # (E, T)
     conflict, distance = playback.conflict, playback.distance[: playback.n_steps]
     if conflict is not None:
-        partner, instant = conflict.partner, conflict.instant
+        vehicle, partner, instant = conflict.vehicle, conflict.partner, conflict.instant
     else:  # the closest approach, and the one that is nearest then
-        instant = int(np.nan_to_num(distance, nan=np.inf).argmin())
+        vehicle, instant = 0, int(np.nan_to_num(distance, nan=np.inf).argmin())
         far = np.hypot(*np.moveaxis(poses[:, instant, :2] - poses[0, instant, :2], -1, 0))
         partner = int(np.nan_to_num(far[1:], nan=np.inf).argmin()) + 1 if len(far) > 1 else 0
-    both = there[0] & there[partner]
+    both = there[vehicle] & there[partner]
     if instant >= len(both) or not both[instant]:
         return None
     step = max(1, round(EVERY / playback.time_step))
     at = _window(both, instant, step, playback.time_step)
     # The ego comes from the left: all pictures read alike.
-    h = float(poses[0, at[0], 2])
+    h = float(poses[vehicle, at[0], 2])
     turn = np.array([[np.cos(h), -np.sin(h)], [np.sin(h), np.cos(h)]])
-    pair = [0, partner] if partner else [0]
+    pair = list(dict.fromkeys([vehicle, partner]))
     middle = poses[pair, instant, :2].mean(axis=0)
     seen = (poses[pair][:, at, :2].reshape(-1, 2) - middle) @ turn
     reach = np.abs(seen).max(axis=0) + MARGIN
@@ -233,7 +233,7 @@ def _thumbnail(playback: Playback, caption: str, entry: str, ego: str) -> Thumbn
         box = (body.length, body.width, body.center_ahead)
         bodies.append(Body(type=body.type, box=box, poses=_rounded(turned, 2)))
     is_contact = (
-        conflict is not None and bool(partner) and conflict.summary.conflict == KINDS[CONTACT]
+        conflict is not None and partner != vehicle and conflict.summary.conflict == KINDS[CONTACT]
     )
     return Thumbnail(
         entry=entry[:500],

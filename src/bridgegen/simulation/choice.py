@@ -205,6 +205,11 @@ class SimulatorChoice:
                 f"{embedded.program.place}: the vehicle '{vehicle}' is of the embedded simulator; "
                 f"{self.name} moves the ego in its own way (--vehicle {KINEMATIC})"
             )
+        if embedded.partners and self.name != EMBEDDED.name:
+            place = embedded.program.place
+            raise InputError(
+                f"{place}: several egos run in the embedded simulator, got {self.name}"
+            )
         if storyboard.left_hand and self.name not in _OURS:
             raise InputError(
                 f"{embedded.program.place}: traffic drives on the left, which the simulators "

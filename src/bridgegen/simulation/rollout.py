@@ -127,6 +127,8 @@ class Rollout:
             has stayed so near to its route that it does not matter. Empty where all are unknown.
         left_hand: whether it is the mirror image of left-hand traffic; see `as_driven`.
         country: by whose law it is judged, a code of ISO 3166-1; "" where none is stated.
+        egos: the same scenarios as rollouts of each further vehicle that the ego's driver drives:
+            it is their entity 0, and the ego has its number. A row ends where its route does.
         messages: details of failures, by row.
         incidents: by row, those that the simulator itself reported.
         derived: intermediate results that several metrics share; see `metrics.metric.shared`.
@@ -166,6 +168,7 @@ class Rollout:
     corridor_of: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     left_hand: bool = False
     country: str = ""
+    egos: "tuple[Rollout, ...]" = ()
     messages: Mapping[int, str] = field(default_factory=dict)
     incidents: Mapping[int, tuple[Incident, ...]] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -252,6 +255,7 @@ class Rollout:
         return replace(
             self,
             **taken,
+            egos=tuple(rollout.take(at) for rollout in self.egos),
             messages={k: self.messages[row] for k, row in rows if row in self.messages},
             incidents={k: self.incidents[row] for k, row in rows if row in self.incidents},
         )
@@ -299,6 +303,9 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
             ]
         if len(arrays[0]):  # else it is not recorded
             whole[name] = np.concatenate(arrays)[order]
+    whole["egos"] = tuple(
+        joined([(each, part.egos[i]) for each, part in parts]) for i in range(len(first.egos))
+    )
     messages = {int(each[row]): text for each, part in parts for row, text in part.messages.items()}
     incidents = {
         int(each[row]): what for each, part in parts for row, what in part.incidents.items()

@@ -1,7 +1,7 @@
 """The conflict analysis of rollouts: conflicts of the ego with each other participant."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -97,7 +97,9 @@ class Conflicts:
             lanes, or the edge of the road, at most, left positive; of a close pass the clearance;
             else 0.
         breach: ``(N, E)`` in [0, 1], of a violation: 1 where it is a failure; else 0.
-        body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own.
+        body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own; or of which
+            further vehicle of its driver, whose conflict with the ego is in its own column.
+        driven: the numbers of these vehicles.
         left_hand: whether it happened in the mirror image of left-hand traffic.
         country: by whose law it is judged, a code of ISO 3166-1; "" where none is stated.
     """
@@ -135,6 +137,13 @@ class Conflicts:
     breach: Float
     left_hand: bool = False
     country: str = ""
+    driven: tuple[int, ...] = ()
+
+    def parties(self, rows: Int | int, other: Int | int) -> tuple[Int, Int]:
+        """Return whose conflict is in a column of rows, and with whom; equal: with no one."""
+        body = self.body[rows, other]
+        vehicle = np.where(np.isin(body, self.driven), body, 0)
+        return vehicle, np.where(other == 0, vehicle, np.where(other == vehicle, 0, other))
 
     @cached_property
     def at_fault(self) -> Bool:
@@ -153,7 +162,7 @@ class Conflicts:
 
 
 def analyse(rollout: Rollout) -> Conflicts:
-    """Return the conflicts of a rollout, computed once.
+    """Return the conflicts of a rollout, computed once: of all vehicles that the driver drives.
 
     Source: Najm et al., DOT HS 810 767 (types); docs/conflicts.md describes the rules.
     """
@@ -162,13 +171,48 @@ def analyse(rollout: Rollout) -> Conflicts:
 
 def encounters(rollout: Rollout) -> Conflicts:
     """Return the same without violations: what the ego and another are involved in."""
-    return shared(rollout, _analyse)
+    return _of_all(rollout, lambda view: shared(view, _analyse))
 
 
 def _with_violations(rollout: Rollout) -> Conflicts:
     from bridgegen.assess.conflict.violations import with_violations  # which imports this module
 
-    return with_violations(rollout, encounters(rollout))
+    return _of_all(rollout, lambda view: with_violations(view, shared(view, _analyse)))
+
+
+def _of_all(rollout: Rollout, judge: Callable[[Rollout], Conflicts]) -> Conflicts:
+    """Return the conflicts of all vehicles that the driver drives: of each pair the worse one.
+
+    Only events up to the first contact of any of them count: bodies that have met drive on.
+    """
+    if not rollout.egos:
+        return judge(rollout)
+    from bridgegen.assess.conflict.harm import harm_of_pairs  # which imports this module
+
+    views, n = (rollout, *rollout.egos), rollout.shape[2] + 1
+    touches = [np.any(view.distance <= 0.0, axis=1) for view in views]
+    firsts = [np.where(each.any(axis=1), each.argmax(axis=1), n) for each in touches]
+    first = np.min(firsts, axis=0)
+    found, *parts = (
+        judge(replace(view, n_steps=np.minimum(view.n_steps, np.where(first < own, first + 1, n))))
+        for view, own in zip(views, firsts, strict=True)
+    )
+    for part in parts:
+        e = rollout.names.index(part.names[0])
+        mine, its = harm_of_pairs(found), harm_of_pairs(part)
+        worse = (its > mine) | ((its == mine) & (part.kind > found.kind))
+        # Where both have failed towards each other, it is the conflict of the one responsible.
+        both = (found.at_fault & part.at_fault)[:, e]
+        blamed = [(one.responsible == Responsible.EGO)[:, e] for one in (found, part)]
+        worse[:, e] = np.where(both & (blamed[0] != blamed[1]), blamed[1], worse[:, e])
+        pairs: dict[str, Any] = {
+            item.name: np.where(worse, getattr(part, item.name), array)
+            for item in fields(found)
+            if isinstance(array := getattr(found, item.name), np.ndarray) and array.ndim == 2
+        }
+        pairs["body"] = np.where(worse, e, found.body)
+        found = replace(found, **pairs, driven=(*found.driven, e))
+    return found
 
 
 def analyse_by(rollout: Rollout, kernel: Callable[..., None]) -> Conflicts:

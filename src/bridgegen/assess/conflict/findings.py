@@ -103,7 +103,9 @@ class Findings:
 
         # A collision course that came to nothing has nobody responsible.
         serious = conflicts.kind[rows, other] >= NEAR_MISS
-        names = np.array(["", *conflicts.names[1:]], dtype=object)
+        names = np.array(conflicts.names, dtype=object)
+        vehicle, partner = conflicts.parties(rows, other)
+        met = (conflicts.kind[rows, other] >= COURSE) & (partner != vehicle)
         return cls(
             words(conflicts.kind, [KINDS.get(kind, "") for kind in range(VIOLATION + 1)]),
             words(conflicts.type, [type_.label for type_ in ConflictType]),
@@ -116,7 +118,7 @@ class Findings:
                 conflicts.rule,
                 [in_the_mirror(r.label) if conflicts.left_hand else r.label for r in Rule],
             ),
-            np.where(conflicts.kind[rows, other] >= COURSE, names[other], ""),
+            np.where(met, names[partner], ""),
             np.array(implausible, dtype=object).reshape(len(other)),
             np.zeros(0, dtype=object) if happened is None else happened,
         )

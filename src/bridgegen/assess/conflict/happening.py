@@ -87,12 +87,13 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
     last = _last_judged(rollout)
     at = np.where(rollout.began <= last[:, np.newaxis] + 1, rollout.began, -1)
     began = at >= 0 if len(at) == n else np.zeros((n, 0), np.bool_)
-    reach = NEAR + NEAR_TIME * np.abs(rollout.v[:, 0])
-    reach[np.arange(rollout.shape[2]) > last[:, np.newaxis]] = -1.0
     last_near = np.full((n, rollout.shape[1]), -1)  # the last instant at which each is near
-    for e in others:
-        is_near = rollout.distance[:, e] <= reach
-        last_near[:, e] = np.where(is_near, np.arange(is_near.shape[1]), -1).max(axis=1)
+    for view in (rollout, *rollout.egos):
+        reach = NEAR + NEAR_TIME * np.abs(view.v[:, 0])
+        reach[np.arange(rollout.shape[2]) > _last_judged(view)[:, np.newaxis]] = -1.0
+        for e in others:
+            is_near = np.where(view.distance[:, e] <= reach, np.arange(rollout.shape[2]), -1)
+            last_near[:, e] = np.maximum(last_near[:, e], is_near.max(axis=1))
     near = last_near[:, others] >= 0
     acting = [
         (i, sorted(actors & {*others}))

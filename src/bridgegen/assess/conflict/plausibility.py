@@ -203,6 +203,9 @@ def plausibility(rollout: Rollout) -> Plausibility:
     that never move only the start counts, and props (cones, barriers, signs) may overlap, as the
     parts of a barrier do. A rollout without kinds is judged by overlaps and jumps alone.
 
+    Of further vehicles that the ego's driver drives only the start counts, as of the ego; and the
+    first contact is that of any of them.
+
     Args:
         rollout: N scenarios.
 
@@ -214,12 +217,17 @@ def plausibility(rollout: Rollout) -> Plausibility:
     n = rollout.shape[0]
     until = np.minimum(steps(rollout) - 1, _last_conflict(rollout))
     cosine, sine = rollout.direction
+    apart, present = distance(rollout), rollout.present
+    if rollout.egos:
+        apart = np.minimum.reduce([apart, *(distance(view) for view in rollout.egos)])
+        present = present.copy() if present.size else np.ones(rollout.shape, np.bool_)
+        present[:, [rollout.names.index(view.names[0]) for view in rollout.egos], 1:] = False
     code = np.empty(n, np.int8)
     instant, entity, other = (np.empty(n, np.int64) for _ in range(3))
     value, limit = np.empty(n), np.empty(n)
     _plausibility_kernels.judge(
         rollout.box, limits_of(rollout), *(recorded(rollout, name) for name in "xyhv"), cosine,
-        sine, distance(rollout), np.ascontiguousarray(rollout.present),
+        sine, apart, np.ascontiguousarray(present),
         towed_by_of(rollout), until + 1, np.asarray(rollout.status) != 0, rollout.time_step,
         window_of(rollout), code, instant, entity, other, value, limit,
     )  # fmt: skip

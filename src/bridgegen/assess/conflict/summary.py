@@ -1,5 +1,6 @@
 """The decisive conflict of one scenario, with all its figures."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -77,7 +78,7 @@ def sentence(conflicts: Conflicts, row: int, other: int) -> str:
         raise IndexError(
             f"row must be 0 to {n - 1} and other 0 to {e - 1}, got row={row}, other={other}"
         )
-    name = f"'{conflicts.names[other]}'"
+    name = f"'{conflicts.names[conflicts.parties(row, other)[1]]}'"
     kind = conflicts.kind[row, other]
     if kind == NO_CONFLICT:
         return ""
@@ -106,7 +107,7 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
     closing = conflicts.closing_normal[row, other]
     own = Zone(int(conflicts.zone_ego[row, other])).label
     mine, whole = f"ego's {own}", "the ego"
-    if conflicts.body[row, other] > 0:
+    if conflicts.body[row, other] > 0 and not conflicts.parties(row, other)[0]:
         mine, whole = f"{own} of the ego's trailer", "the ego's trailer"
     its = Zone(int(conflicts.zone_other[row, other])).label
     kind = ConflictType(int(conflicts.type[row, other]))
@@ -240,6 +241,7 @@ class ConflictSummary:
         harm: in [0, 1], as the row's, but of this conflict alone.
         aside: of a violation, see `Conflicts.aside` [m]; else 0.
         avoidance: the end of ``sentence`` that says whether braking would have avoided it.
+        vehicle: name of the further vehicle of the driver whose conflict it is; "" of the ego's.
     """
 
     conflict: str
@@ -272,6 +274,7 @@ class ConflictSummary:
     harm: float
     aside: float = 0.0
     avoidance: str = ""
+    vehicle: str = ""
 
     @property
     def bare(self) -> str:
@@ -313,6 +316,7 @@ class ConflictSummary:
             "zone_other",
         ):
             texts[name] = getattr(self, name) or None
+        texts |= {"vehicle": self.vehicle} if self.vehicle else {}
         texts["preventable"] = self.preventable if self.happened else None
         return texts | {
             name: {"value": value if isfinite(value) else None, "unit": unit}
@@ -348,6 +352,10 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
     kind = int(conflicts.kind[row, other])
     rule = Rule(conflicts.rule[row, other])
     happened = kind >= NEAR_MISS
+    vehicle, partner = conflicts.parties(row, other)
+    said = sentence(conflicts, row, other)
+    if vehicle:  # of several egos each is called by its name
+        said = re.sub(r"\b([Tt]he ego)\b", rf"\1 {conflicts.names[vehicle]}", said)
     sort = ConflictType(conflicts.type[row, other])
 
     def number(name: str) -> float:
@@ -373,9 +381,10 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
     }
     found = ConflictSummary(
         conflict=KINDS[kind],
-        sentence=sentence(conflicts, row, other),
+        sentence=said,
         avoidance=avoidance(conflicts, row, other),
-        partner=conflicts.names[other] if other else "",
+        partner=conflicts.names[partner] if partner != vehicle else "",
+        vehicle=conflicts.names[vehicle] if vehicle else "",
         type=sort.label,
         type_source=sort.source,
         responsible=Responsible(conflicts.responsible[row, other]).label if happened else "",

@@ -17,7 +17,7 @@ from bridgegen.base.errors import (
     UnknownNameError,
     UnsupportedError,
 )
-from bridgegen.drivers.drivers import CODES, DRIVERS
+from bridgegen.drivers.drivers import CODES, DRIVERS, SCRIPTED
 from bridgegen.drivers.noise import noise_key
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.engine.stated import keyed
@@ -108,11 +108,12 @@ def _ignored_drivers(path: Path, flavour: str) -> list[str]:
     scenario, _ = _read(path)
     # Any driver of the ego: the question is about the others.
     program = compile_storyboard(scenario, str(path), driver=DRIVERS["route-follower"])
-    names = ", ".join(f"'{program.names[e]}'" for e in program.attends.tolist())
+    driven = np.flatnonzero(program.others != SCRIPTED)
+    names = ", ".join(f"'{program.names[e]}'" for e in driven.tolist())
     if not names:
         return []
     codes = {code: name for name, code in CODES.items()}
-    driver = "' or '".join(codes[code] for code in np.unique(program.others[program.attends]))
+    driver = "' or '".join(codes[code] for code in np.unique(program.others[driven]))
     what = (
         f"other tools than BridgeGen ignore their driver '{driver}' and move them as the "
         f"storyboard says; --flavour {RECORDED} has them move as they did"

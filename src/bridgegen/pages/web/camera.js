@@ -14,7 +14,8 @@ const ACROSS = 100; // m across, that are shown where the ego is kept in the mid
 
 // The other participant of the conflict, else whoever comes nearest to the ego; 0 if nobody does.
 function partnerOf(kept) {
-  if (kept.conflict?.partner_number > 0) return kept.conflict.partner_number;
+  const shown = kept.conflict?.partner_number || kept.conflict?.vehicle_number;
+  if (shown > 0) return shown;
   const near = kept.closest === null ? null : nearestTo(kept, stateAt(kept, kept.closest));
   return near ? near.entity : 0;
 }

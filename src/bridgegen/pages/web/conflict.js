@@ -43,6 +43,7 @@ export function conflictLines(found) {
   const line = (name, value, title = "") => element("div", { title }, element("span", { class: "name" }, name), element("b", {}, value));
   const figure = (name) => quantity(...found.numbers[name], 3);
   const lines = [element("h3", {}, "Its conflict"), line("conflict", conflictWord(found.conflict))];
+  if (found.vehicle) lines.push(line("of", found.vehicle, "which the ego's driver drives, too"));
   if (WITH_DECISION.includes(found.conflict)) {
     lines.push(line("type", found.type, found.type_source));
     if (found.partner) lines.push(line("partner", found.partner));
@@ -70,7 +71,7 @@ export function drawZones(c, kept, state, scale) {
   const found = kept.conflict;
   if (!found || !ZONED.includes(found.conflict)) return;
   if (Math.abs(state.index - found.instant) * kept.time_step > ZONE_SHOWN) return;
-  [[0, found.zones[0]], [found.partner_number, found.zones[1]]].forEach(([e, zone]) => {
+  [[found.vehicle_number ?? 0, found.zones[0]], [found.partner_number, found.zones[1]]].forEach(([e, zone]) => {
     const s = state.entities[e], body = kept.entities[e];
     if (!ZONES[zone] || !isPlaced(s)) return;
     const [cx, cy] = boxCentre(body, s.x, s.y, s.h), ux = Math.cos(s.h), uy = Math.sin(s.h);
@@ -96,7 +97,7 @@ export function drawZones(c, kept, state, scale) {
 export function drawDecided(c, kept, centres, scale) {
   const found = kept.conflict;
   if (!found || !WITH_DECISION.includes(found.conflict)) return;
-  for (const e of new Set([0, found.partner_number])) {
+  for (const e of new Set([found.vehicle_number ?? 0, found.partner_number])) {
     const at = centres[e]?.[found.decided];
     if (!at) continue;
     for (const [colour, width] of [[palette.card, 5], [palette.ink, 2.5]]) {

@@ -16,21 +16,21 @@ const GLYPH_PAST = 1.5; // s, of each path
 
 /** A canvas; null of a scenario that has no conflict with another body. */
 export function glyph(packed) {
-  const kept = unpack(packed), found = kept.conflict, e = found?.partner_number;
-  if (!e) return null;
+  const kept = unpack(packed), found = kept.conflict, e = found?.partner_number, own = found?.vehicle_number ?? 0;
+  if (e === undefined || e === own) return null;
   const k = Math.min(found.instant, kept.n_steps - 1), dense = window.devicePixelRatio || 1;
   const canvas = element("canvas", { class: "glyph", width: GLYPH_SIDE * dense, height: GLYPH_SIDE * dense, "aria-hidden": "true" });
   const draw = () => {
     const c = canvas.getContext("2d"), scale = (GLYPH_SIDE * dense) / GLYPH_SPAN;
     const at = (i) => boxCentre(kept.entities[i], kept.x[i][k], kept.y[i][k], kept.h[i][k]);
-    const [[ax, ay], [bx, by]] = [at(0), at(e)];
+    const [[ax, ay], [bx, by]] = [at(own), at(e)];
     c.setTransform(1, 0, 0, 1, 0, 0);
     c.clearRect(0, 0, canvas.width, canvas.height);
     c.translate(canvas.width / 2, canvas.height / 2);
     c.scale(scale, -scale);
-    c.rotate(Math.PI / 2 - kept.h[0][k]);
+    c.rotate(Math.PI / 2 - kept.h[own][k]);
     c.translate(-(ax + bx) / 2, -(ay + by) / 2);
-    for (const [i, colour] of [[e, palette["other-1"]], [0, palette.ego]]) {
+    for (const [i, colour] of [[e, palette["other-1"]], [own, palette.ego]]) {
       const { length, width } = kept.entities[i];
       c.strokeStyle = c.fillStyle = colour;
       c.lineWidth = 0.5;
@@ -49,9 +49,9 @@ export function glyph(packed) {
     }
     const zone = ZONES[found.zones[0]];
     if (!zone) return;
-    const { length, width } = kept.entities[0], mean = (j) => zone.reduce((sum, point) => sum + point[j], 0) / zone.length;
+    const { length, width } = kept.entities[own], mean = (j) => zone.reduce((sum, point) => sum + point[j], 0) / zone.length;
     c.translate(ax, ay);
-    c.rotate(kept.h[0][k]);
+    c.rotate(kept.h[own][k]);
     c.fillStyle = palette.hit;
     c.beginPath();
     c.arc((mean(0) * length) / 2, (mean(1) * width) / 2, 0.7, 0, 2 * Math.PI);

@@ -233,9 +233,10 @@ LOOKING = (ATTENTIVE, INSISTENT, "lawful")
 """Drivers that limit the script by what is in the way."""
 
 DRIVERS = (*LOOKING, SCRIPTED)
-"""Drivers that a participant other than the ego may have."""
+"""Drivers that all participants other than the ego may have."""
 
 EGO = "ego"
+"""Name of the ego; of a driver: the ego's, which drives this participant, too."""
 ABLE = ("vehicle", "bicycle", "pedestrian")
 """Conduct of participants that get the driver which a scenario states for all."""
 
@@ -285,7 +286,9 @@ def with_others(scenario: LogicalScenario, others: str) -> LogicalScenario:
     adversary = scenario.adversary.participant if scenario.adversary else None
     story = scenario.story
     bare = [
-        participant if participant.name in (EGO, adversary) else replace(participant, driver="")
+        participant
+        if participant.name in (EGO, adversary) or participant.driver == EGO
+        else replace(participant, driver="")
         for participant in story.participants
     ]
     changed = driven(bare, story.events, others)

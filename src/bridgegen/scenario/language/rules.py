@@ -54,7 +54,7 @@ def bounds_between_layers(
     weathers = ("", *prefixes)
     yield from speed_bounds(roads.knobs["speed_limit"], story, parameters, prefixes, place)
     for participant in story.participants:
-        if participant.conduct != "vehicle" or participant.name == "ego":
+        if participant.conduct != "vehicle" or "ego" in (participant.name, participant.driver):
             continue  # the ego's driver is under test: what it dares is its own affair
         radii = [bend(roads, at) for at in participant.at_each_place]
         for radius in dict.fromkeys(item for item in radii if item is not None):

@@ -465,11 +465,16 @@ class Storyboard:
                 f"'{driver}' here",
                 place,
             )
+        elif driver == EGO:
+            kind, has_route = PARTICIPANTS[given.type], given.end or given.places
+            if kind.seen_as.conduct != "vehicle" or kind.on_rails or given.path or not has_route:
+                why = "the ego's driver drives vehicles that have a start and an end on lanes"
+                self._report(f"{why}; {name} is of type {given.type}", place)
         elif driver not in DRIVERS:
             hint = nearest(driver, DRIVERS)
             self._report(
-                f"the driver of {name} must be one of {', '.join(DRIVERS)} (others are for the "
-                f"ego), got '{driver}'{hint}",
+                f"the driver of {name} must be one of {', '.join(DRIVERS)}, ego (others are for "
+                f"the ego), got '{driver}'{hint}",
                 place,
             )
         elif driver in LOOKING and PARTICIPANTS[given.type].seen_as.conduct == "obstacle":
@@ -518,7 +523,8 @@ class Storyboard:
                 self._report(f"{name} must have an action: {', '.join(ACTIONS)}", path)
             if given.participant is not None:
                 self._check_participant(given.participant, (*path, "participant"))
-                if given.participant == EGO:
+                acting = self._acting.get(given.participant)
+                if given.participant == EGO or (acting and acting.driver == EGO):
                     self._report("events move the others; the ego's driver is under test", path)
             when = tuple(
                 tuple(self._conditions(given, condition_section, (*path, "when", number)))

@@ -264,7 +264,8 @@ def _bend(key: str, curvature: str, needs: tuple[str, ...]) -> Rule:
         f"({shown('1.0e0 / MAX(?sharp)')} AS ?radius) "
         f"({shown('COALESCE(MIN(?friction), 1.0e0)')} AS ?mu) "
         f"WHERE {{ {_PARTICIPANT} {is_a('?value', 'Vehicle')} "
-        f'FILTER NOT EXISTS {{ ?value bg:has_name "ego" }} {curvature} '
+        f'FILTER NOT EXISTS {{ ?value bg:has_name "ego" }} '
+        f'FILTER NOT EXISTS {{ ?value bg:has_controller/bg:has_driver "ego" }} {curvature} '
         f"?value {_DOES}/bg:has_target_speed ?speed . "
         f"OPTIONAL {{ $this {_WEATHERS}/bg:has_road_state/bg:has_friction ?friction }} "
         "OPTIONAL { ?value bg:has_reason_to_exceed ?reason } } "

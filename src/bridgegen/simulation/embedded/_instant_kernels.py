@@ -77,8 +77,14 @@ def before_driver(k, plan, roads, state, record):
 @inlined_kernel
 def after_driver(k, demanded, curvature, plan, roads, state, record):
     """Move all entities to instant k + 1, or end the row; see ``_ego_kernels.demand``."""
+    x, y, h = move_driven(k, demanded, curvature, plan, roads, state, record)
+    move_others(k, x, y, h, plan, roads, state, record)
+
+
+@inlined_kernel
+def move_driven(k, demanded, curvature, plan, roads, state, record):
+    """Move the ego on from instant k if its driver does; return its new x, y [m] and heading."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
-    first = 0
     if plan.limits.shape[0] > 0:
         demanded = heed_domain(k, demanded, plan, state)
     if plan.has_pedals:
@@ -94,10 +100,16 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
         run_kernel_at(plan.heeds, (k, plan, roads, state, record))
     if is_steered(plan, state):
         x, y, h = move_steered(k, demanded, curvature, plan, roads, state, record)
-        first = 1
     elif plan.is_driven and state.drives[LONGITUDINALLY] == 1:
         move_paced(k, demanded, plan, roads, state, record)
-        first = 1
+    return x, y, h
+
+
+@inlined_kernel
+def move_others(k, x, y, h, plan, roads, state, record):
+    """Move all that no driver has moved, or end the row; x, y and h are the ego's new pose."""
+    drives = state.drives[LATERALLY] == 1 or state.drives[LONGITUDINALLY] == 1
+    first = 1 if plan.is_driven and drives else 0
     for e in range(first, record.x.shape[0]):  # entities that depend on no other come first
         state.timed[e] = state.present[e] and state.follow[e] >= 0
         if plan.moves_laid and state.timed[e] and state.laid_count[e] > 0:
@@ -118,6 +130,8 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
             command_speed(e, k, plan, roads, state, record)
         if plan.has_pedals and state.holds[e]:
             command_by_pedals(e, k, plan, roads, state, record)
+        if state.given[e]:  # its driver has moved it, in a rollout of which it is the ego
+            continue
         if plan.moves_laid and state.laid_count[e] > 0:
             run_kernel_at(plan.moves_laid, (e, k, plan, roads, state, record))
         elif plan.attends and plan.others[e] != SCRIPTED:

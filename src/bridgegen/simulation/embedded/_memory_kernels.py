@@ -225,6 +225,7 @@ class State(NamedTuple):
         tail_first: ``(E,)`` bool, it follows its trajectory tail first.
         pose: ``(3,)`` scratch: x, y [m], heading [rad] of a place along a trajectory.
         timed: ``(E,)`` bool, a timetable moves it at this instant.
+        given: ``(E,)`` bool, the ego's driver drives it, too; see `together`.
         placed: ``(E,)`` bool, it was teleported at this instant, and does not move on.
         goal: ``(E, 2)`` [m], the position that it is sent to,
         goal_action: ``(E,)`` int64, by which action; -1: none.
@@ -328,6 +329,7 @@ class State(NamedTuple):
     tail_first: Annotated[Bool, "entities"]
     pose: Annotated[Float, 3]
     timed: Annotated[Bool, "entities"]
+    given: Annotated[Bool, "entities"]
     placed: Annotated[Bool, "entities"]
     goal: Annotated[Float, "entities", 2]
     goal_action: Annotated[Int, "entities"]

@@ -9,11 +9,16 @@ Both ways run the same functions on the same arrays, so they give the same bits.
 from numba import float64, int64
 
 from bridgegen.base.compiled import bundled, bundled_row, inlined_kernel, kernel
-from bridgegen.simulation.embedded._instant_kernels import after_driver, before_driver
+from bridgegen.simulation.embedded._instant_kernels import (
+    after_driver,
+    before_driver,
+    move_driven,
+    move_others,
+)
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
 )
-from bridgegen.simulation.embedded.drivers import demand
+from bridgegen.simulation.embedded.drivers import demand, take
 from bridgegen.simulation.embedded.storyboard import start
 
 
@@ -83,3 +88,34 @@ def after_drivers(k, demanded, curvature, plan, networks, rows, states, records)
             roads = bundled_row(networks, rows[i])
             state, record = bundled_row(states, i), bundled_row(records, i)
             after_driver(k, demanded[i], curvature[i], plan, roads, state, record)
+
+
+@kernel
+def move_driven_rows(k, demanded, curvature, plan, networks, rows, states, records):
+    """Move the egos of the rows that still run on from instant k; see `together`."""
+    plan = bundled(plan)
+    for i in range(len(rows)):
+        if states.ending[i, N_STEPS] == 0:
+            roads = bundled_row(networks, rows[i])
+            state, record = bundled_row(states, i), bundled_row(records, i)
+            move_driven(k, demanded[i], curvature[i], plan, roads, state, record)
+
+
+@kernel
+def move_others_rows(k, driven, plan, networks, rows, states, records):
+    """Move all but the egos of the rows that still run on from instant k, or end them.
+
+    ``driven`` ``(N, B, 8)``: other vehicles with drivers as `take` has it, and their numbers.
+    """
+    plan = bundled(plan)
+    after = min(k + 1, records.x.shape[2] - 1)
+    for i in range(len(rows)):
+        if states.ending[i, N_STEPS] == 0:
+            roads = bundled_row(networks, rows[i])
+            state, record = bundled_row(states, i), bundled_row(records, i)
+            for b in range(driven.shape[1]):
+                e = int(driven[i, b, 7])
+                if state.given[e]:
+                    take(e, k, driven[i, b], roads, state, record)
+            x, y, h = record.x[0, after], record.y[0, after], record.h[0, after]
+            move_others(k, x, y, h, plan, roads, state, record)

@@ -18,7 +18,7 @@ from bridgegen.drivers._surroundings_kernels import AROUND
 from bridgegen.drivers._tracking_kernels import TRACK
 from bridgegen.drivers._weather_columns import FRICTION, WEATHER
 from bridgegen.drivers.compiled import CONFLICT
-from bridgegen.drivers.drivers import DEMAND, STAGES, STORYBOARD
+from bridgegen.drivers.drivers import DEMAND, SCRIPTED, STAGES, STORYBOARD, TESTED
 from bridgegen.drivers.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.drivers.kinds import DETECTION, NEEDS_ROOM
 from bridgegen.drivers.lane_tables import STRAYS
@@ -186,7 +186,7 @@ class Batch:
             array[...] = 0
         self.record.x[:, :, :] = FAR_APART * np.arange(self.record.x.shape[1])[:, np.newaxis]
         self.state.ending[:, memory.N_STEPS] = self.record.x.shape[2]
-        return self.rollout()
+        return Batch.rollout(self)
 
     def kinds(self) -> tuple[Any, ...]:
         """Return the types of what kernels of a row take: plan, roads, state and record."""
@@ -453,6 +453,7 @@ def _plan(program: Program, until_collision: bool) -> memory.Plan:
         "dt": program.time_step,
         **stages,
     }
+    given["others"] = np.where(program.others == TESTED, SCRIPTED, program.others)
     tables = {name: getattr(program, name) for name in memory.Plan._fields if name not in given}
     return memory.Plan(**tables, **given)
 

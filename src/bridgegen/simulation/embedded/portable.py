@@ -80,6 +80,8 @@ def tables(
 
     if program.driver.is_own or program.driver.home:
         raise InputError(f"the driver '{program.driver.name}' is no compiled one of BridgeGen's")
+    if roads.partners:
+        raise InputError("the ego's driver drives several vehicles")
     batch = Batch(program, roads, np.array([network]), {})
     plan = _coded(batch.plan, program)
     unset: Any = {name: np.zeros_like(getattr(batch.record, name)) for name in UNSET}

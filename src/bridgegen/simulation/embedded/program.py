@@ -16,7 +16,7 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import STORYBOARD, Driver
 from bridgegen.drivers._weather_columns import FRICTION_SCALE
-from bridgegen.drivers.drivers import SCRIPTED
+from bridgegen.drivers.drivers import SCRIPTED, TESTED
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded._codes import (
@@ -367,7 +367,12 @@ class Program:
     @property
     def attends(self) -> Int:
         """The numbers of the participants whose driver looks ahead."""
-        return np.flatnonzero(self.others != SCRIPTED)
+        return np.flatnonzero((self.others != SCRIPTED) & (self.others != TESTED))
+
+    @property
+    def tested(self) -> Int:
+        """The numbers of the participants that the ego's driver drives, besides the ego."""
+        return np.flatnonzero(self.others == TESTED)
 
     @property
     def actors(self) -> list[frozenset[int]]:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,8 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import Driver
 from bridgegen.drivers._weather_columns import WEATHER
+from bridgegen.drivers.address import is_remote
+from bridgegen.drivers.noise import noise_key
 from bridgegen.drivers.user_drivers import Traits
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -108,6 +111,8 @@ class EmbeddedSimulator:
 
     Attributes:
         program: the compiled storyboard.
+        partners: of each further vehicle that the ego's driver drives, a simulator of the same
+            storyboard in which that vehicle is the ego; see `together`.
 
     Raises:
         UnsupportedError: what it cannot run, by name and line, all of it at once.
@@ -126,7 +131,8 @@ class EmbeddedSimulator:
         time_step: float | None = None,
         skipped: list[str] | None = None,
     ) -> None:
-        self.program = compile_storyboard(
+        compiled = partial(
+            compile_storyboard,
             storyboard,
             place,
             driver=driver,
@@ -134,12 +140,17 @@ class EmbeddedSimulator:
             others=others,
             vehicle=vehicle,
             time_step=time_step,
-            skipped=skipped,
         )
+        self.program = compiled(skipped=skipped)
+        self.partners: tuple[EmbeddedSimulator, ...] = ()
+        for e in self.program.tested.tolist():
+            partner = copy(self)
+            partner.program, partner.partners = compiled(ego=e, skipped=skipped and []), ()
+            self.partners += (partner,)
 
     def __getstate__(self) -> dict[str, Any]:
         """Another process has the same storyboard, and processes of its own for a user's driver."""
-        return {"program": self.program}
+        return {"program": self.program, "partners": self.partners}
 
     @property
     def embedded(self) -> "EmbeddedSimulator":
@@ -197,7 +208,9 @@ class EmbeddedSimulator:
         self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()
     ) -> Network:
         """See `Simulator`: each entity's route, planned and sampled."""
-        return Network(self.program, models, courses)
+        network = Network(self.program, models, courses)
+        network.partners = tuple(each.roads(models, courses) for each in self.partners)
+        return network
 
     def run(
         self,
@@ -267,8 +280,15 @@ class EmbeddedSimulator:
         **how: Any,
     ) -> "Callable[[Int], Batch]":
         """Return what sets up some of the rows for the user's driver."""
+        spec, others = self.program.driver.spec, [each.program.names[0] for each in self.partners]
+        if others and (is_remote(spec) or self._own.traits.memory is not None):
+            raise InputError(
+                f"the driver '{spec}' drives one vehicle ({', '.join(others)} would be another); "
+                "drivers that ship, classes in Python and co-simulation units drive several"
+            )
         traits = self._own.traits
-        roads.provide(traits.wants)
+        for network in (roads, *roads.partners):
+            network.provide(traits.wants)
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
 
         def some(at: Int) -> "Batch":
@@ -333,8 +353,8 @@ class EmbeddedSimulator:
 
     def stop(self) -> None:
         """See `Simulator`."""
-        if self.program.driver.is_own:
-            self._own.stop()
+        for simulator in (self, *self.partners) if self.program.driver.is_own else ():
+            simulator._own.stop()
 
     @property
     def own_driver(self) -> "OwnDriver":
@@ -403,4 +423,17 @@ class EmbeddedSimulator:
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
         program = self.program.changed(driver=driver, dry=dry, kinematic=kinematic)
-        return Batch(program, roads, rows, values, own, noise, until_collision)
+        if not self.partners:
+            return Batch(program, roads, rows, values, own, noise, until_collision)
+        from bridgegen.simulation.embedded.together import Together
+
+        keys = self.noise_keys(values, len(rows)) if noise is None else noise
+        found = []
+        for simulator, network in zip(self.partners, roads.partners, strict=True):
+            there = simulator.program.changed(driver=driver, dry=dry, kinematic=kinematic)
+            its = keys ^ noise_key({there.names[0]: 0.0}, 1)  # sensors err independently
+            other = Batch(there, network, rows, values, own, its)
+            wheel = partial(getattr, other, "demand")
+            found.append((other, partial(simulator._own.wheel, there, other) if own else wheel))
+        # A row in which one vehicle collides goes on for the other.
+        return Together(found, program, roads, rows, values, own, keys)

@@ -7,7 +7,7 @@ import numpy as np
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.drivers import STORYBOARD, Driver
-from bridgegen.drivers.drivers import CODES, SCRIPTED
+from bridgegen.drivers.drivers import CODES, SCRIPTED, TESTED
 from bridgegen.drivers.kinds import IS_VEHICLE, NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
@@ -135,6 +135,7 @@ def compile_storyboard(
     vehicle: str | None = None,
     time_step: float | None = None,
     skipped: list[str] | None = None,
+    ego: int = 0,
 ) -> Program:
     """Compile a scenario file.
 
@@ -149,6 +150,7 @@ def compile_storyboard(
         time_step: [s], whatever the file says.
         skipped: takes a sentence for each thing that the rollout cannot do, which is left out then
             instead of refused, with what it is part of; never the ego.
+        ego: number of an entity that changes places with the file's ego, whose driver drives it.
 
     Raises:
         UnsupportedError: what the rollout cannot do, by name and line, all of it at once.
@@ -157,7 +159,7 @@ def compile_storyboard(
     # What was cut may have been what another element waits for, so the rest is compiled again,
     # until nothing is left to cut.
     while True:
-        compiler = _Compiler(scenario, place)
+        compiler = _Compiler(scenario, place, ego)
         try:
             return compiler.compile(driver, ideal, others, vehicle, time_step)
         except InputError as error:
@@ -176,11 +178,11 @@ def compile_storyboard(
 
 
 class _Compiler:
-    def __init__(self, scenario: osc.OpenScenario, place: str) -> None:
+    def __init__(self, scenario: osc.OpenScenario, place: str, ego: int) -> None:
         scenario, texts = texts_resolved(scenario)
         self.scenario = scenario
         self.place = place
-        self.tables = Tables(scenario, place)
+        self.tables = Tables(scenario, place, ego)
         self.tables.fixed |= texts
         self.paths: list[PathSpec] = []
         self.positions = Positions(self.tables, int(str(scenario.file_header.rev_minor)))
@@ -258,6 +260,10 @@ class _Compiler:
             trajectories.index(e) if self.actions.is_timed(e) else -1 for e in range(len(objects))
         ]
         others_drivers = self._others(objects, others)
+        if (others_drivers == TESTED).any() and not has_driver:
+            self.tables.problems.append(
+                f"{self.place}: the ego's driver drives others, too, and the ego has none (--ego)"
+            )
         n_steps = round(min(duration / step, MAX_STEPS)) + 1
         if not 2 <= n_steps <= MAX_STEPS:
             self.tables.problems.append(
@@ -324,7 +330,9 @@ class _Compiler:
             couplings=self.towing.couplings(),
             stands_apart=np.array(self.start.apart, dtype=np.int64),
             weathers=global_actions.environments.rows,
-            limits=limits_of(objects[0], self.place),
+            limits=limits_of(
+                objects[self.tables.ego], self.place
+            ),  # of the system, not of its body
             values=np.array(global_actions.values.slots, dtype=np.int64),
             lights=tuple(signals.lights),
             first_states=np.array(signals.first_states, dtype=np.int8),
@@ -390,9 +398,12 @@ class _Compiler:
         for e, (name, body) in enumerate(zip(self.tables.names, objects, strict=True)):
             if e == 0:
                 continue
-            said = declared.other_driver(self.controllers, self.place, e, name)
+            mine = e == self.tables.ego  # the file's ego, in another's place
+            said = "ego" if mine else declared.other_driver(self.controllers, self.place, e, name)
             lacks = self._lacks_for_attention(e, body)
-            if others is not None:
+            if said == "ego" and not (lacks or IS_VEHICLE[kind(body)]):
+                lacks = "it is no vehicle"
+            if others is not None and said != "ego":
                 found[e] = SCRIPTED if lacks else CODES[others]
             elif said not in (None, "scripted") and lacks:
                 self.tables.problems.append(

@@ -76,7 +76,7 @@ class Controllers:
 
     def of(self, entity: int) -> Iterator[osc.Controller]:
         """Yield an entity's controllers from the start on, in the order of the file."""
-        owner = self._tables.objects[entity]
+        owner = self._tables.objects[entity or self._tables.ego]
         for controller in owner.object_controllers:
             yield controller.controller
         for private in self._scenario.storyboard.init.actions.privates:

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from bridgegen.base.arrays import Int
 from bridgegen.base.errors import InputError, UnknownNameError, UnsupportedError
 from bridgegen.drivers import DRIVERS, GUESTS, STORYBOARD, Driver, get, is_planner, is_spec, split
-from bridgegen.drivers.drivers import OTHERS, STOP_IN_LANE
+from bridgegen.drivers.drivers import CODES, STOP_IN_LANE
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
@@ -132,8 +132,8 @@ def other_driver(controllers: Controllers, place: str, entity: int, name: str) -
         if value is None:
             continue
         where = f"{place}, line {controller.line}: "
-        if str(value) not in OTHERS:
-            known = ", ".join(OTHERS)
+        if str(value) not in CODES:
+            known = ", ".join(CODES)
             what = f"unknown driver '{value}' of '{name}'"
             if str(value) in DRIVERS | GUESTS or is_spec(str(value)) or is_planner(str(value)):
                 what = f"the driver '{value}' is for the ego, not for '{name}'"

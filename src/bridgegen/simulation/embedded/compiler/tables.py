@@ -32,6 +32,7 @@ class Tables:
     Attributes:
         place: the file, for messages.
         objects: its entities, the ego first.
+        ego: the number of the file's ego, whose controllers say what the system under test is.
         names: their names.
         parameters: the numeric parameters with their declared values.
         problems: what the rollout cannot do, a sentence each.
@@ -40,10 +41,13 @@ class Tables:
         fixed: parameters that rows may not vary, and what they are used for.
     """
 
-    def __init__(self, scenario: osc.OpenScenario, place: str) -> None:
+    def __init__(self, scenario: osc.OpenScenario, place: str, ego: int = 0) -> None:
         self.place = place
         objects = scenario.entities.scenario_objects
         self.objects = sorted(objects, key=_rank)
+        self.ego = ego
+        if ego:  # another that the same driver drives is in its place
+            self.objects[0], self.objects[ego] = self.objects[ego], self.objects[0]
         self._selections = {
             str(selection.name): selection for selection in scenario.entities.entity_selections
         }

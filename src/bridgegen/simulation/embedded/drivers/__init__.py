@@ -14,6 +14,7 @@ from bridgegen.simulation.embedded.drivers._ego_kernels import (
     move_heeding,
     move_paced,
     move_steered,
+    take,
 )
 from bridgegen.simulation.embedded.drivers._lane_view_kernels import LANES, see_lanes_of_rows
 from bridgegen.simulation.embedded.drivers._map_view_kernels import MEMORY, see_map_of_rows
@@ -59,4 +60,5 @@ __all__ = [
     "see_conflicts_of_rows",
     "see_lanes_of_rows",
     "see_map_of_rows",
+    "take",
 ]

@@ -266,6 +266,29 @@ def impose_rows(k, bodies, imposed, plan, networks, rows, states, records):
 
 
 @kernel
+def take(e, k, driven, roads, state, record):
+    """Move entity e on from instant k as its driver has in the rollout whose ego it is.
+
+    ``driven``: its next x, y, h and v; acceleration, metres travelled, and seconds that it stood.
+    """
+    step = driven[5] - state.travelled[e]
+    record.a[e, k], state.travelled[e], state.stood[e] = driven[4], driven[5], driven[6]
+    if k == record.x.shape[1] - 1:
+        return
+    record.x[e, k + 1], record.y[e, k + 1] = driven[0], driven[1]
+    record.h[e, k + 1], record.v[e, k + 1] = driven[2], driven[3]
+    p = state.on[e]
+    if p >= 0:
+        path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
+        s = state.station[e] + step
+        state.station[e], state.aside[e] = project(path, n, ds, s, driven[0], driven[1])
+        # As of an ego: the end of its first path is its goal if it has a route.
+        if state.station[e] >= (n - 1) * ds and (state.route[e] == 0 or p != e):
+            pass_end(e, 0.0, roads, state)
+    record.offset[e, k + 1] = state.aside[e]
+
+
+@kernel
 def egos_are_through(plan, networks, rows, states, through):
     """Fill ``(N,)`` bool: whether a driven ego is at the end of its route, or of the road."""
     plan = bundled(plan)

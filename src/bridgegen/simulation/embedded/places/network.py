@@ -50,6 +50,7 @@ class Network:
         turnings: the ways of the ego whose route changes lanes; see `Ways.turnings`.
         crosswalks: ``(P, C, 5)`` float64 of the ego's first route; see `Rollout.crosswalks`.
         maps: P road maps, if a driver wants them.
+        partners: the same of storyboards in which other vehicles are the ego; see `together`.
         left_hand: whether they are the mirror image of left-hand traffic.
         country: by whose law they are judged, a code of ISO 3166-1; "" where it is not one.
     """
@@ -61,6 +62,7 @@ class Network:
         courses: Sequence[Mapping[str, Float]] = (),
     ) -> None:
         self._program = program
+        self.partners: tuple[Network, ...] = ()
         self.left_hand = any(model.left_hand for model in models)
         stated = {kind.country for model in models for road in model.roads for kind in road.types}
         self.country = str(stated.pop() or "") if len(stated) == 1 else ""
