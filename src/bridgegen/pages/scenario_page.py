@@ -104,8 +104,9 @@ def _participant(participant: Participant, scenario: LogicalScenario) -> str:
         return f"{who}, stands at {_place(participant.start)}{turned}{extra}."
     goes = "" if participant.end is None else f" and goes to {_place(participant.end)}"
     if participant.change:
-        begin, by = map(_place, participant.change)
+        begin, by, *back = map(_place, participant.change)
         goes += f", changing lanes between {begin} and {by}"
+        goes += f", and back between {' and '.join(back)}" if back else ""
     return f"{who}, starts at {_place(participant.start)} at {speed}{turned}{extra}{goes}."
 
 

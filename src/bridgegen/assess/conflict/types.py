@@ -155,6 +155,7 @@ class Rule(IntEnum):
     CUT_IN_REQUIRED = _codes.CUT_IN_REQUIRED
     REVERSED = _codes.REVERSED
     NO_PRIORITY = _codes.NO_PRIORITY
+    OBSTRUCTION_WAITS = _codes.OBSTRUCTION_WAITS
 
     @property
     def label(self) -> str:
@@ -273,6 +274,10 @@ RULES = {
     Rule.REVERSED: (
         "reversed towards the other, or across its way",
         "Vienna Convention, Art. 14 (2); StVO § 9 (5)",
+    ),
+    Rule.OBSTRUCTION_WAITS: (
+        "passed an obstruction on the lane of oncoming traffic, and did not let the other go first",
+        "Vienna Convention, Art. 12 (1); StVO § 6",
     ),
     Rule.NO_PRIORITY: (
         "drove on where nobody has priority by law",
