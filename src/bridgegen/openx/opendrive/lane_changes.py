@@ -41,6 +41,10 @@ SHORTEST = 15.0
 EVERY = 20.0
 """Distance between two places at which a change of the ego's route may begin [m]; ours."""
 
+LEAST = 20.0
+"""Length of the way from one lane to the other before an obstruction, where one has waited [m]: room
+to see past it; ours."""
+
 _COST = 200.0  # m of detour that a lane change is worth
 _SLOPE = 0.1  # m, over which the slope of a lane's centre is taken
 
@@ -199,7 +203,7 @@ def passings(model: OpenDrive, places: Sequence[Place], usual: float) -> list[Tu
     """Return the routes over six places that pass something, see `leads_round`.
 
     All have changed lanes by the third place; the first begins where the second is, or ``usual``
-    [m] before the third, the others every `EVERY` metres later, the last `SHORTEST` before it.
+    [m] before the third, the others every `EVERY` metres later, the last `LEAST` before it.
 
     Raises:
         InputError: there is too little room, or no way to the second place or from the fifth.
@@ -222,7 +226,8 @@ def passings(model: OpenDrive, places: Sequence[Place], usual: float) -> list[Tu
         within = replace(within, across=_cubic(road, other, other, over.s, until.s))
     returning, after = list(_change(road, other, own, until.s, back.s)), leg(model, back, end)
     found = []
-    for rest in np.linspace(room, SHORTEST, 1 + int((room - SHORTEST) / EVERY)).tolist():
+    least = min(LEAST, room)
+    for rest in np.linspace(room, least, 1 + int((room - least) / EVERY)).tolist():
         first = over.s - way * rest
         lead = leg(model, start, leaves._replace(s=first))
         steps = [*lead, *_change(road, own, other, first, over.s), within]
