@@ -401,7 +401,7 @@ def of_passing(scene, e, k, whole):
     came, _, early = entered(scene, e, 0, k, 0.0)
     # Standing does not avoid an ego that comes on, unless that stops, too.
     could = braked_and_stood(scene, e, 0, came, came - early, COMFORT, True) == CLEAR
-    return (SHARED if could else EGO), OBSTRUCTION_WAITS
+    return (SHARED if could and scene.v[e, k] > MOVES else EGO), OBSTRUCTION_WAITS
 
 
 @kernel
