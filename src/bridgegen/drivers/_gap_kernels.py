@@ -12,9 +12,10 @@ on it the change begins and how long it is [m], how far left it leads [m], and t
 traffic comes on the other lane; where on it the way returns to its first lane (+inf: it does not)
 and over which length [m], and 1 where traffic on the other lane is oncoming.
 
-Oncoming traffic goes first: the ego leaves its lane only if, whoever comes keeping its speed or
-that of the last second's gain, the ego is back `CLEARS` before they meet. It takes no longer than it
-would at `COMFORT_ACCELERATION` up to what the bends of its way allow.
+Oncoming traffic goes first: the ego leaves its lane only if it is back `CLEARS` before it meets
+whoever comes, who keeps its speed or what it gains in a second. The ego reckons that it accelerates
+comfortably, up to what the bend of its way back allows. As long as it can stop on its lane, it goes
+back when somebody comes whom it has not seen.
 
 Sources: UN Regulation 79, 5.6.4.7 (a change is critical if the one behind must brake by more than
 3 m/s² after 0.4 s, so as to keep the distance that the vehicle travels in 1 s) and 5.6.4.6 (the
@@ -78,11 +79,11 @@ KEEPS_TO = (
 )
 GOES_ON = 3.0  # m/s²; from a gap that it needs more to stop before, it goes on
 AHEAD = 200.0  # m, how far ahead it looks on the other lane
-CLEARS = 2.0  # s, left to oncoming traffic when it is back; twice AASHTO's 1 s, since others brake late
+CLEARS = 2.0  # s, left to oncoming traffic when it is back; ours
 SETTLED = 2.0  # s, for which it must have seen one that comes to know its speed; ours
 GAINS_FOR = 1.0  # s, for which it expects who comes to go on to speed up
 EDGE = 1.2  # m aside, beyond which it does not go back; a car's side is 0.4 m over the line then
-LOOKS = 1.0  # s, for which it must have seen the lane of oncoming traffic free; sensors lose a car far away
+LOOKS = 1.0  # s, for which it must have seen the lane free: sensors lose one that is far away
 IS_BACK = 0.65  # of the way back, after which two cars have 0.6 m between them
 PASSES_AT = 8.0  # m/s, by no more than which it reckons beside what stands in its lane; ours
 FALLS_BACK = 2.0  # m/s, slower than the vehicle beside or ahead that it lets get away
@@ -104,7 +105,8 @@ def led_aside(changes, p, s):
         if changes[j, PATH] == p:
             u = min(max((s - changes[j, BEGINS]) / changes[j, LENGTH], 0.0), 1.0)
             w = min(max((s - changes[j, RETURNS]) / changes[j, BACK], 0.0), 1.0)
-            return changes[j, LEADS] * (u * u * (3.0 - 2.0 * u) - w * w * (3.0 - 2.0 * w))
+            out = changes[j, LEADS] * u * u * (3.0 - 2.0 * u)
+            return out - changes[j, LEADS] * w * w * (3.0 - 2.0 * w)
     return 0.0
 
 
@@ -189,7 +191,9 @@ def is_free_of_oncoming(s, v, front, half_width, target, change, tracks, around,
     ``change`` is its way, a row of ``changes``; ``abreast`` [m] its station on the other lane,
     along which ``around`` counts.
     """
-    pace = min(target, PASSES_AT, change[BACK] * math.sqrt(LATERAL_COMFORT / (6.0 * abs(change[LEADS]))))
+    pace = min(
+        target, PASSES_AT, change[BACK] * math.sqrt(LATERAL_COMFORT / (6.0 * abs(change[LEADS])))
+    )
     left = change[RETURNS] + IS_BACK * change[BACK] - s
     needs = CLEARS + time_to(left, min(v, pace), pace)
     for e in range(1, around.shape[0]):
@@ -212,7 +216,7 @@ def is_free_of_oncoming(s, v, front, half_width, target, change, tracks, around,
 
 @kernel
 def has_decided(changes, p, s, v, front):
-    """Return whether the ego, at station s of path p and ``v`` [m/s], stays with its change of lane.
+    """Return whether the ego, at station s of path p and ``v`` [m/s], stays with its change.
 
     To the lane of oncoming traffic, as long as it is not far aside and can stop, it goes back when
     somebody comes: one sees past what stands in one's lane only from its edge.
@@ -295,8 +299,8 @@ def await_gap(k, step, perceives, plan, roads, state, record):
 def is_other_lanes(e, v, front, roads, state):
     """Return whether body e keeps to the other lane, or beyond: then the gap is all that matters.
 
-    Once the ego, at ``v`` [m/s] and with its bumper ``front`` [m] ahead, has decided, that is so of those behind it
-    alone, who can brake for it.
+    Once the ego, at ``v`` [m/s] and with its bumper ``front`` [m] ahead, has decided, that is so of
+    those behind it alone, who can brake for it; of nobody who comes towards it.
     """
     changes, beside = roads.changes, state.beside
     last = changes.shape[0] - 1

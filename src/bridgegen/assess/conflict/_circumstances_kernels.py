@@ -223,7 +223,7 @@ def ego_will_come_over(scene, e, k, side):
 
 @kernel
 def passes_against(scene, e, k):
-    """Return whether the ego passes something on the lane of oncoming traffic, and meets body e there.
+    """Return whether the ego meets body e on the lane of oncoming traffic, to pass something.
 
     Its route leads there, see `bridgegen.drivers.right_of_way.PASSES`.
     """

@@ -42,8 +42,8 @@ EVERY = 20.0
 """Distance between two places at which a change of the ego's route may begin [m]; ours."""
 
 LEAST = 20.0
-"""Length of the way from one lane to the other before an obstruction, where one has waited [m]: room
-to see past it; ours."""
+"""Length of the way from one lane to the other before an obstruction, where one has waited [m]:
+room to see past it; ours."""
 
 _COST = 200.0  # m of detour that a lane change is worth
 _SLOPE = 0.1  # m, over which the slope of a lane's centre is taken

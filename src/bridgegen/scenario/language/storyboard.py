@@ -66,7 +66,7 @@ BEFORE = 5.0
 of its rear axle; ours."""
 
 BEHIND = 3.0
-"""Distance behind it from which on the ego returns [m]: its rear is 1 m behind its rear axle; ours."""
+"""Distance behind it from which on the ego returns [m]: its rear is 1 m behind the axle; ours."""
 
 _OF_EVENTS = ("after", "began")
 

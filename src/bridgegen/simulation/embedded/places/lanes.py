@@ -94,7 +94,9 @@ class Lanes:
         """
         places = [self._on_lane(spot) for spot in spots]
         # One that passes something on the lane beside is back on its own.
-        self.ways.append(self._way(places[::5] if leads_round(self.graph.model, places) else places))
+        self.ways.append(
+            self._way(places[::5] if leads_round(self.graph.model, places) else places)
+        )
 
     def locate(self, spot: Spot) -> tuple[int, int, float, float, int]:
         """Return number of the road, lane id, s, how far left of the lane's centre [m], and a way.

@@ -88,7 +88,7 @@ def _find_zones(zones: Float, number: int, program: Program, ways: Ways) -> None
         turning = ways.turnings.get(other) if other == 0 else None
         if turning is None:
             continue
-        # Where the ego changes lanes, and that it will, nobody knows; nor that it comes to meet them.
+        # Where the ego changes lanes, and that it will, nobody knows; nor that it comes this way.
         meets = turning.begins <= zones[other, OTHER_ENTERS] <= turning.returns + turning.back
         if zones[other, HOW] != ACROSS or (turning.against and meets):
             zones[other] = np.inf

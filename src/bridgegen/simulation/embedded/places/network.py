@@ -11,8 +11,8 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.interface import RoadMap
 from bridgegen.drivers.lane_tables import CORRIDOR, LANE, corridor_along, lanes_along
 from bridgegen.drivers.map_grid import grid_of, no_grid
-from bridgegen.drivers.road_map import road_map
 from bridgegen.drivers.right_of_way import PASSES
+from bridgegen.drivers.road_map import road_map
 from bridgegen.drivers.scene import Scene, beside, stacked, stop_lines, survey
 from bridgegen.openx.opendrive.lane_graph import Cells, Ground
 from bridgegen.openx.opendrive.lanes import section_index
