@@ -27,7 +27,7 @@ def cruise(k, plan, roads, state, record):
     if roads.changes.shape[0] > 0:
         waits = await_gap(k, plan.dt, False, plan, roads, state, record)
         for e in range(1, len(state.heeded)):
-            state.heeded[e] &= not is_other_lanes(e, front, roads, state)
+            state.heeded[e] &= not is_other_lanes(e, record.v[0, k], front, roads, state)
     p, s, v = state.on[0], state.station[0], record.v[0, k]
     lines = roads.stops if leads_on(roads.changes, p) else roads.stops[:0]
     stopping = int(state.mind[STOPS_FOR]) - 1

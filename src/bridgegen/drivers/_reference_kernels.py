@@ -183,7 +183,7 @@ def drive(k, plan_, roads, state, record):
         surround(path, n, ds, s, behind, ahead, elapsed, state.tracks, state.around)
         if turns:
             for e in range(1, state.around.shape[0]):
-                if is_other_lanes(e, body[2] + 0.5 * body[0], roads, state):
+                if is_other_lanes(e, v, body[2] + 0.5 * body[0], roads, state):
                     state.around[e, NEAR] = 0.0
         if plan_.ideal_prediction and known:
             count = predict_truly(
@@ -199,7 +199,7 @@ def drive(k, plan_, roads, state, record):
                 state.passages,
             )  # fmt: skip
         if turns:
-            count = without_joining(state.passages, count, roads.changes)
+            count = without_joining(state.passages, count, roads.changes, state.beside)
         in_town = road_n > 0 and roads.road[min(int(s / ds), road_n - 1), LIMIT] <= FAST_ROAD
         seen = light_seen = math.inf
         if not plan_.ideal_perception:

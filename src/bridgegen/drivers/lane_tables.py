@@ -74,15 +74,21 @@ def corridor_along(model: OpenDrive, route: Route, path: Float, step: float, fas
     """
     found = np.full((len(path), CORRIDOR), np.inf)
     found[:, :3] = path[:, :3]
+    beside = np.full((len(path), 2), -np.inf)
     for at, road, number, lane_id, s in _places(model, route, len(path), step):
         t, way = borders(road, number, s), road.direction(lane_id)
         own = _across(road, s, path[at, :2])
         for i, towards in enumerate((way, -way)):
             lane, last = _reach(road, number, lane_id, towards)
             found[at, LANES.start + i] = towards * (_border(t, lane, towards) - own)
+            aside = np.abs(own - 0.5 * (t[lane_id] + t[inner(lane_id)])) > STRAYS
+            beside[at, i] = np.where(aside, 0.5 * np.abs(t[lane_id] - t[inner(lane_id)]), -np.inf)
             if not road.is_connecting:
                 found[at, EDGES.start + i] = towards * (_border(t, last, towards) - own)
         found[at, TOWN] = speed_limits(road, number, lane_id, s) <= fast
+    if (found[:, LANES] < 0.0).any():
+        # A route that leads over the lane of oncoming traffic, to pass something, is no departure.
+        found[:, LANES] = np.maximum(found[:, LANES], beside)
     return found
 
 

@@ -37,8 +37,9 @@ WAIT = ("205", STOP_SIGN)
 PRIORITY = ("301", "306")
 """Signs: right of way at this junction, priority road."""
 
-NOBODY = 1
-"""Claim of each participant against itself where the law has no rule at such a junction."""
+NOBODY, PASSES = 1, 2
+"""Claims of participants against themselves, which add up: of each where the law has no rule at
+such a junction; of the ego whose route passes something on the lane of oncoming traffic."""
 
 THEY_WAIT, NO_RULE, WE_WAIT = 1, 0, -1
 

@@ -107,8 +107,9 @@ def _participant(participant: Participant, scenario: LogicalScenario) -> str:
         return f"{who}, stands at {place(participant.start)}{turned}{extra}."
     goes = "" if participant.end is None else f" and goes to {place(participant.end)}"
     if participant.change:
-        begin, by = map(place, participant.change)
+        begin, by, *back = map(place, participant.change)
         goes += f", changing lanes between {begin} and {by}"
+        goes += f", and back between {' and '.join(back)}" if back else ""
     return f"{who}, starts at {place(participant.start)} at {speed}{turned}{extra}{goes}."
 
 

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from bridgegen.assess.conflict.analysis import analyse
+from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
 from bridgegen.base.errors import ScenarioError
 from bridgegen.drivers._gap_kernels import leaves_room
 from bridgegen.drivers.kinds import LEFT
@@ -145,3 +147,114 @@ def test_mistakes(tmp_path, old, new, words):
     for word in words:
         assert word in str(caught.value)
     assert "wrong.yaml, line" in str(caught.value)
+
+
+PASSES = """
+scenario: passes
+title: The ego passes a van
+description: A van stands in the ego's lane, and one comes.
+source: Ours.
+template: road
+roads:
+  {lanes: 1, lanes_against: 1, length: 700.0, speed_limit: 13.9, road_type: town, lane_width: 3.5}
+duration: 40.0 # s
+time_step: 0.05 # s
+axes: [participants]
+include: [weather]
+driver: reference
+others: scripted
+participants:
+  ego:
+    type: car
+    start: {lane: 1, distance: 60.0}
+    end: {lane: 1, distance: 300.0}
+    passes: {around: van}
+    speed: 9.0
+  van:
+    type: van
+    start: {lane: 1, distance: 180.0}
+    speed: 0.0
+  other:
+    type: car
+    start: {way: in, lane: 1, distance: other_at}
+    speed: other_speed
+parameters:
+  other_at: {axis: participants, unit: m, low: 100.0, high: 650.0, default: 400.0,
+    description: Where the other is, source: Ours.}
+  other_speed: {axis: participants, unit: m/s, low: 0.0, high: 9.0, default: 9.0,
+    description: The other's, source: Ours.}
+objective: harm
+"""
+
+
+@pytest.fixture(scope="module")
+def passing(tmp_path_factory):
+    path = tmp_path_factory.mktemp("passes") / "passes.yaml"
+    path.write_text(PASSES)
+    scenario = load(str(path))
+    space = scenario.space()
+
+    def driven(ego, *rows):
+        made = Runner(scenario, space, PipelineOptions(ego=ego, ideal=()))
+        return made.run(np.array([space.row(row) for row in rows]))
+
+    return driven
+
+
+def test_one_that_looks_lets_oncoming_traffic_pass_the_van_first(passing):
+    """StVO § 6: it is on the other lane only when the other is past, or so far that it is back."""
+    rollout = passing("careful", {"other_at": 330.0}, {"other_at": 110.0}, {"other_at": 650.0})
+    x, offset = rollout.x, rollout.offset[:, 0]
+    aside = offset > 1.2
+    assert not (aside & (x[:, 1] > x[:, 0]) & (x[:, 1] < x[:, 0] + 60.0)).any()
+    first, last = aside.argmax(axis=1), rollout.n_steps - 1
+    assert x[0, 1, first[0]] < x[0, 0, first[0]]  # it waited
+    assert rollout.v[0, 0].min() < 0.1 < 3.0 < rollout.v[1:, 0].min()
+    for row in range(3):
+        assert offset[row].max() == pytest.approx(LANE, abs=0.1)
+        assert offset[row, last[row]] == pytest.approx(0.0, abs=0.1)  # it is back
+        assert rollout.x[row, 0, last[row]] > 290.0
+    assert not analyse(rollout).kind.any()  # nor is the way round a departure from its lane
+
+
+def test_one_that_meets_oncoming_traffic_beside_the_van_is_responsible(passing):
+    rollout = passing("route-follower", {"other_at": 290.0}, {"other_at": 650.0})
+    found = analyse(rollout)
+    assert found.type[0, 1] == ConflictType.HEAD_ON
+    assert found.responsible[0, 1] == Responsible.EGO
+    assert found.rule[0, 1] == Rule.OBSTRUCTION_WAITS
+    assert found.preventable[0, 1]
+    assert found.at_fault[0].any()
+    assert not found.kind[1].any()
+
+
+def test_one_that_comes_into_the_egos_lane_is_responsible_though_the_ego_passes(passing):
+    """The ego, shifted back to its own lane, is not on the other's."""
+    rollout = passing("route-follower", {"other_at": 290.0})
+    rollout.offset[:] = 0.0
+    rollout.y[:, 0] = rollout.y[:, 0, :1]
+    rollout.y[:, 1] = rollout.y[:, 0]
+    rollout.y[:, 2] = 99.0  # no van
+    found = analyse(rollout)
+    assert found.responsible[0, 1] == Responsible.OTHER
+    assert found.rule[0, 1] == Rule.WRONG_SIDE
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("around: van", "around: vann", ("stands on a lane", "'vann'")),
+        ("around: van", "around: other", ("stands on a lane", "'other'")),
+        ("around: van", "around: van, before: 200 m", ("its start may be at 60 m",)),
+        ("around: van", "around: van, lanes: -1", ("has 1 lanes out, got lane 2",)),
+        ("lanes_against: 1", "lanes_against: 0", ("has 0 lanes in, got lane 1",)),
+        ("distance: 180.0", "distance: other_at", ("stands on a lane", "'van'")),
+    ],
+)
+def test_mistakes_of_a_way_round(tmp_path, old, new, words):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(PASSES.replace(old, new))
+    with pytest.raises(ScenarioError) as caught:
+        load(str(path))
+    for word in words:
+        assert word in str(caught.value)

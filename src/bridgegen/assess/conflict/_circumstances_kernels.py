@@ -11,6 +11,7 @@ from bridgegen.assess.conflict._limits import (
     AHEAD,
     ALIKE,
     ASIDE,
+    BRAKING,
     CROSSWALK_MARGIN,
     EVIDENT_EVERY,
     HALVINGS,
@@ -32,7 +33,8 @@ from bridgegen.assess.conflict._limits import (
 )
 from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers.kinds import BRAKE_LIGHTS_FROM, IS_VULNERABLE
+from bridgegen.drivers.kinds import BRAKE_LIGHTS_FROM, IS_ANIMAL, IS_PEDESTRIAN, IS_VULNERABLE
+from bridgegen.drivers.right_of_way import PASSES
 
 RED, RED_AND_YELLOW = 1, 2
 """States of a light, as ``Rollout.lights`` has them."""
@@ -225,6 +227,35 @@ def ego_will_come_over(scene, e, k, side):
             _, its = steering(scene, e, k, LATELY)
             return its < ASIDE
     return False
+
+
+@kernel
+def passes_against(scene, e, k):
+    """Return whether the ego meets body e on the lane of oncoming traffic, to pass something.
+
+    Its route leads there, see `bridgegen.drivers.right_of_way.PASSES`.
+    """
+    c, s, kind = scene.c, scene.s, scene.kinds[e]
+    if not scene.claims[0] & PASSES or abs(scene.offset[0, k]) <= ASIDE:
+        return False
+    return c[0, k] * c[e, k] + s[0, k] * s[e, k] < -ALIKE and not (
+        IS_PEDESTRIAN[kind] or IS_ANIMAL[kind]
+    )
+
+
+@kernel
+def could_wait_since(scene, k):
+    """Return the last instant at which the ego, off its lane at k, could still stop on its lane."""
+    left = k
+    while left > scene.first and abs(scene.offset[0, left - 1]) > ASIDE:
+        left -= 1
+    i, braking = left, min(BRAKING, scene.friction)
+    while i > scene.first:
+        v = scene.v[0, i]
+        if v * REACTION + v * v / (2.0 * braking) <= scene.gone[0, left] - scene.gone[0, i]:
+            break
+        i -= 1
+    return i
 
 
 @kernel

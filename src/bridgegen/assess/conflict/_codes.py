@@ -38,8 +38,8 @@ NEITHER, EGO, OTHER, SHARED = range(4)
     COULD_HAVE_STOPPED, INTO_THE_SIDE, STANDING_AHEAD, ASSUMED_RIGHT_BEFORE_LEFT, UNSAFE_START,
     BRAKED_HARD_AHEAD, EMERGENCY_VEHICLE, FROM_OFF_ROAD, WRONG_SIDE,
     PASSED_TOO_CLOSE, DID_NOT_KEEP_LANE, LEFT_THE_ROAD, CUT_IN_REQUIRED, REVERSED, NO_PRIORITY,
-    OPENED, MISLED,
-) = range(34)  # fmt: skip
+    OPENED, MISLED, OBSTRUCTION_WAITS,
+) = range(35)  # fmt: skip
 """Rules of responsibility. The four from MAP_PRIORITY on are in the order of the claims of
 `bridgegen.drivers.right_of_way`; EMERGENCY_VEHICLE and FROM_OFF_ROAD are those of a siren and of
 who comes from off the road."""

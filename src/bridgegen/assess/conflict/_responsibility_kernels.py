@@ -18,6 +18,7 @@ from bridgegen.assess.conflict._careful_driver_kernels import (
 )
 from bridgegen.assess.conflict._circumstances_kernels import (
     ahead_until,
+    could_wait_since,
     ego_came_over,
     ego_comes_before,
     ego_goes_over,
@@ -25,6 +26,7 @@ from bridgegen.assess.conflict._circumstances_kernels import (
     ego_will_come_over,
     has_set_off,
     on_crosswalk_since,
+    passes_against,
     ran_red,
     same_road,
     side_of,
@@ -67,6 +69,7 @@ from bridgegen.assess.conflict._codes import (
     NEITHER,
     NO_PRIORITY,
     OBJECT,
+    OBSTRUCTION_WAITS,
     OPENED,
     OTHER,
     PASSED_TOO_CLOSE,
@@ -153,7 +156,7 @@ from bridgegen.drivers.kinds import (
     LEFT,
     RIGHT,
 )
-from bridgegen.drivers.right_of_way import SIREN
+from bridgegen.drivers.right_of_way import NOBODY, SIREN
 
 
 @kernel
@@ -361,6 +364,8 @@ def decide(
             if its >= 0 and IS_PEDESTRIAN[scene.kinds[e]] and avoidable:
                 return EGO, COULD_HAVE_STOPPED
             return (EGO if mine >= 0 else OTHER), RED_LIGHT
+    if kind not in (REAR_END_STRIKING, REAR_END_STRUCK, OBJECT) and passes_against(scene, e, k):
+        return of_passing(scene, e, k, whole)
     if kind in (VRU_BY_FRONT, VRU_INTO_SIDE):
         return of_vulnerable(scene, e, k, kind, own, since, avoidable, whole)
     if kind == REAR_END_STRUCK:
@@ -390,21 +395,36 @@ def of_standing(scene, e, k, own, whole):
     One that has priority need not brake harder than `COMFORT`, neither from when the ego came into
     its way, nor, since it may expect that the ego stops before it, from when the ego stands there.
     """
-    claim = scene.claims[e]
-    if claim < 0 and claim != -SIREN:
+    claim, passes = scene.claims[e], passes_against(scene, e, k)
+    if passes or (claim < 0 and claim != -SIREN):
         came, _, early = entered(scene, e, 0, k, 0.0)
         # Either since the ego came into its way, or since it stands there: who could brake
         # comfortably from one of these on had no need to run into it.
         for since in (came, min(still_since(scene.v[0], scene.first, k), k)):
             if braked(scene, e, 0, since, located(since, came, early), COMFORT) == COLLIDES:
                 whole[DECIDED] = since
-                return EGO, rule_of(claim)
+                return EGO, OBSTRUCTION_WAITS if passes else rule_of(claim)
     ahead = scene.c[0, k] * scene.c[e, k] + scene.s[0, k] * scene.s[e, k] >= SAME_WAY
     if ahead and own in (REAR, REAR_LEFT, REAR_RIGHT):
         who = of_braking(scene, e, k, whole)
         if who != NEITHER:
             return who, BRAKED_WITHOUT_REASON
     return OTHER, STRUCK_STANDING
+
+
+@kernel
+def of_passing(scene, e, k, whole):
+    """Decide where the ego meets oncoming body e on its lane, to pass something.
+
+    It is to wait on its own lane while one comes. One that could have braked comfortably since the
+    ego was in its way shares that. A careful driver waits if it sees the other in time.
+    """
+    waits = could_wait_since(scene, k)
+    whole[DECIDED], whole[PREVENTABLE] = waits, visible_from(scene, e, waits, 0.0, k)[0] <= waits
+    came, _, early = entered(scene, e, 0, k, 0.0)
+    # Standing does not avoid an ego that comes on, unless that stops, too.
+    could = braked_and_stood(scene, e, 0, came, came - early, COMFORT, True) == CLEAR
+    return (SHARED if could and scene.v[e, k] > MOVES else EGO), OBSTRUCTION_WAITS
 
 
 @kernel
@@ -729,7 +749,7 @@ def of_crossing(scene, e, k, own, risk, seen, avoidable, whole):
         if mine != its:
             return (EGO if mine else OTHER), TURNING_GIVES_WAY
         return SHARED, TURNING_GIVES_WAY
-    if scene.claims[0] != 0:  # of the ego against itself: the law of the country has no rule
+    if scene.claims[0] & NOBODY:  # of the ego against itself: the law of the country has no rule
         return SHARED, NO_PRIORITY
     j = max(k - int(TURN_TIME / scene.dt), scene.first)
     from_right = scene.c[0, j] * scene.s[e, j] - scene.s[0, j] * scene.c[e, j] > 0.0

@@ -159,7 +159,7 @@ def _responsibility(conflicts: Conflicts, row: int, other: int, name: str) -> st
         return f"both are responsible: {_BY_BOTH[rule]} ({source})"
     words = words.replace("the other", "the ego" if who == Responsible.OTHER else name)
     kind = ConflictType(int(conflicts.type[row, other]))
-    if who == Responsible.SHARED and kind in _CROSSINGS:
+    if who == Responsible.SHARED and (kind in _CROSSINGS or rule == Rule.OBSTRUCTION_WAITS):
         words += f", and {name} drove on although comfortable braking would have done"
     elif who == Responsible.SHARED and kind == ConflictType.UNJUSTIFIED_BRAKING:
         words += f", and {name} was too close or braked late"

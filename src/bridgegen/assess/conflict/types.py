@@ -157,6 +157,7 @@ class Rule(IntEnum):
     NO_PRIORITY = _codes.NO_PRIORITY
     OPENED = _codes.OPENED
     MISLED = _codes.MISLED
+    OBSTRUCTION_WAITS = _codes.OBSTRUCTION_WAITS
 
     @property
     def label(self) -> str:
@@ -270,6 +271,10 @@ RULES = {
     Rule.REVERSED: (
         "reversed towards the other, or across its way",
         "Vienna Convention, Art. 14 (2); StVO § 9 (5)",
+    ),
+    Rule.OBSTRUCTION_WAITS: (
+        "passed an obstruction on the lane of oncoming traffic, and did not let the other go first",
+        "Vienna Convention, Art. 12 (1); StVO § 6",
     ),
     Rule.NO_PRIORITY: (
         "drove on where nobody has priority by law",

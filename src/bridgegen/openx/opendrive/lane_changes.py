@@ -7,13 +7,14 @@ other's that has their directions at its ends.
 import heapq
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
 import numpy as np
 
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lanes import (
+    Coefficients,
     borders,
     lane_at,
     section_end,
@@ -40,6 +41,10 @@ SHORTEST = 15.0
 EVERY = 20.0
 """Distance between two places at which a change of the ego's route may begin [m]; ours."""
 
+LEAST = 20.0
+"""Length of the way from one lane to the other before an obstruction, where one has waited [m]:
+room to see past it; ours."""
+
 _COST = 200.0  # m of detour that a lane change is worth
 _SLOPE = 0.1  # m, over which the slope of a lane's centre is taken
 
@@ -57,6 +62,8 @@ def plan_with_changes(model: OpenDrive, places: Sequence[tuple[str, int, float]]
     stops = [Place(*place) for place in places]
     for stop in stops:
         lane_at(model.road(stop.road_id), stop.lane_id, stop.s)
+    if leads_round(model, stops):
+        return passings(model, stops, USUAL)[0].route
     steps: list[Step] = []
     for start, end in pairwise(stops):
         try:
@@ -108,12 +115,18 @@ class Turning:
         begins: where on it the change begins [m].
         length: of the change [m].
         across: how far left it leads [m], to the right negative.
+        returns: where on the route it begins to return to its first lane [m]; +inf: it does not.
+        back: length of that change [m].
+        against: whether the other lane is one of oncoming traffic.
     """
 
     route: Route
     begins: float
     length: float
     across: float
+    returns: float = math.inf
+    back: float = 1.0
+    against: bool = False
 
 
 def turnings(model: OpenDrive, places: Sequence[Place], usual: float) -> list[Turning]:
@@ -160,6 +173,77 @@ def turnings(model: OpenDrive, places: Sequence[Place], usual: float) -> list[Tu
         route = route_along(model, [step for step in steps if step.s != step.s_end])
         aside = _centre(road, to, first, by.s)[0] - _centre(road, item, first, by.s)[0]
         found.append(Turning(route, route_along(model, lead).length, length, way * aside))
+    return found
+
+
+def leads_round(model: OpenDrive, places: Sequence[Place]) -> bool:
+    """Return whether a route over places passes something on a lane beside its own, and returns.
+
+    It has six: start; from where on it may change; by where it must have, on the other lane; from
+    where on it returns; by where it has, on its own; end.
+    """
+    if len(places) != 6:
+        return False
+    leaves, over, until, back = places[1:5]
+    road = model.road(leaves.road_id)
+    way, number = road.direction(leaves.lane_id), section_index(road, leaves.s)
+    beside = [neighbour(road, leaves.lane_id, side) for side in (1, -1)]
+    return (
+        over.lane_id == until.lane_id in beside
+        and back.lane_id == leaves.lane_id
+        and all(
+            (place.road_id, section_index(road, place.s)) == (road.id, number)
+            for place in (over, until, back)
+        )
+        and all((b.s - a.s) * way >= 0.0 for a, b in pairwise((leaves, over, until, back)))
+    )
+
+
+def passings(model: OpenDrive, places: Sequence[Place], usual: float) -> list[Turning]:
+    """Return the routes over six places that pass something, see `leads_round`.
+
+    All have changed lanes by the third place; the first begins where the second is, or ``usual``
+    [m] before the third, the others every `EVERY` metres later, the last `LEAST` before it.
+
+    Raises:
+        InputError: there is too little room, or no way to the second place or from the fifth.
+    """
+    start, leaves, over, until, back, end = places
+    road = model.road(leaves.road_id)
+    number, way = section_index(road, leaves.s), road.direction(leaves.lane_id)
+    own = Stretch(road.id, number, leaves.lane_id)
+    other = own._replace(lane_id=over.lane_id)
+    room = min((over.s - leaves.s) * way, usual)
+    for metres, a, b in ((room, leaves, over), ((back.s - until.s) * way, until, back)):
+        if metres < SHORTEST:
+            raise InputError(
+                f"a lane change needs {SHORTEST:g} m of road, but there are {metres:.3g} m on road "
+                f"{road.id} from s={a.s:g} m to s={b.s:g} m"
+            )
+    against = road.direction(over.lane_id) != way
+    within = Step(road.id, other.lane_id, over.s, until.s)
+    if against:
+        within = replace(within, across=_cubic(road, other, other, over.s, until.s))
+    returning, after = list(_change(road, other, own, until.s, back.s)), leg(model, back, end)
+    found = []
+    least = min(LEAST, room)
+    for rest in np.linspace(room, least, 1 + int((room - least) / EVERY)).tolist():
+        first = over.s - way * rest
+        lead = leg(model, start, leaves._replace(s=first))
+        steps = [*lead, *_change(road, own, other, first, over.s), within]
+        begins, returns = (route_along(model, each).length for each in (lead, steps))
+        steps += [*returning, *after]
+        if against:
+            # It stays one of its own lane, beside which it leads: what the map says of a lane of
+            # oncoming traffic is said for the other direction.
+            steps = [
+                replace(step, lane_id=own.lane_id) if step.across is not None else step
+                for step in steps
+            ]
+        route = route_along(model, [step for step in steps if step.s != step.s_end])
+        aside = _centre(road, other, over.s, until.s)[0] - _centre(road, own, over.s, until.s)[0]
+        length = abs(back.s - until.s)
+        found.append(Turning(route, begins, rest, way * aside, returns, length, against))
     return found
 
 
@@ -285,6 +369,17 @@ def _within(road: Road, lanes: list[Stretch], entry: float, leave: float) -> Ite
 
 def _change(road: Road, item: Stretch, other: Stretch, s: float, s_end: float) -> Iterator[Step]:
     """Yield a change from one lane to the next: half of it on either."""
+    low, cubic = min(s, s_end), _cubic(road, item, other, s, s_end)
+    # Half of the change counts as on each lane, so that who is asked which lane the entity is on
+    # gets the nearer one.
+    middle = 0.5 * (s + s_end)
+    for stretch, first, last in ((item, s, middle), (other, middle, s_end)):
+        across = shifted(cubic, min(first, last) - low)
+        yield Step(road.id, stretch.lane_id, first, last, across)
+
+
+def _cubic(road: Road, item: Stretch, other: Stretch, s: float, s_end: float) -> Coefficients:
+    """Return the t of a way from one lane to the next, over the distance from the lesser s."""
     low, high = min(s, s_end), max(s, s_end)
     at_low, at_high = (item, other) if s < s_end else (other, item)
     a, b = _centre(road, at_low, low, high)
@@ -292,18 +387,12 @@ def _change(road: Road, item: Stretch, other: Stretch, s: float, s_end: float) -
     span = high - low
     # The cubic with both lanes' places and slopes at its ends: without the slopes, a change in a
     # taper would begin and end with a kink.
-    cubic = (
+    return (
         a,
         b,
         (3.0 * (c - a) / span - 2.0 * b - d) / span,
         (2.0 * (a - c) / span + b + d) / span**2,
     )
-    # Half of the change counts as on each lane, so that who is asked which lane the entity is on
-    # gets the nearer one.
-    middle = 0.5 * (s + s_end)
-    for stretch, first, last in ((item, s, middle), (other, middle, s_end)):
-        across = shifted(cubic, min(first, last) - low)
-        yield Step(road.id, stretch.lane_id, first, last, across)
 
 
 def _centre(road: Road, stretch: Stretch, s: float, towards: float) -> tuple[float, float]:

@@ -309,7 +309,9 @@ def _piece(
         if direction < 0:
             h += math.pi
         bend = direction * curvature / stretch
-        return Piece(road.id, station, stretch * (b - a), x, y, h, bend, s, s_end, width)
+        aside = across is not None
+        length = stretch * (b - a)
+        return Piece(road.id, station, length, x, y, h, bend, s, s_end, width, None, aside)
     taper = Taper.along(geometry, a - geometry.s, t, direction, b - a)
     _check_fold(taper.least_stretch(), road, lane, inside)
     x, y, h, bend = (float(part[0]) for part in taper.at(np.zeros(1))[:4])

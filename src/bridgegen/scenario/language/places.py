@@ -283,7 +283,8 @@ class TemporaryChanges:
             return "road works close a driving lane, given by its number"
         if isinstance(lanes, str) or isinstance(self._roads.knobs["lane_width"], str):
             return "road works need a fixed number of lanes of a fixed width"
-        if lanes < 2:
+        against = self._roads.lanes(start.leg, "in" if start.way == "out" else "out")
+        if lanes < 2 and (isinstance(against, str) or against < 1):
             return f"road works leave a lane to drive on; leg {start.leg} {start.way} has only one"
         if not 0.0 < given.taper <= given.length or not 1.0 <= given.spacing <= 50.0:
             return (

@@ -84,7 +84,8 @@ class Participant:
         exceeds_limit: why it may drive faster than road and weather allow; empty: it may not.
         off_crosswalk: why a pedestrian is on the road away from crosswalks; empty: it is not.
         change: of the ego's route, which changes to the lane beside: from where on it may, on its
-            lane, and by where it must have, on the other; empty: it keeps its lanes.
+            lane, and by where it must have, on the other; where it passes something, also from
+            where on it returns, and by where it has; empty: it keeps its lanes.
     """
 
     name: str

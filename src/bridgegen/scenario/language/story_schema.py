@@ -82,6 +82,20 @@ class RouteChangeSection(ShapedSection):
     """Length of road from there on which it must have changed [m], a constant."""
 
 
+class PassSection(ShapedSection):
+    """What stands in the ego's lane, which its route passes on the lane beside."""
+
+    around: Word
+    """Participant that stands, or road works, in the ego's lane."""
+    lanes: Literal[1, -1] = 1
+    """Lane on which it is passed: 1 the one to its left, that of oncoming traffic where there is no
+    other; -1 the one to its right."""
+    before: Annotated[Metres, Field(ge=25.0, le=300.0)] = 60.0
+    """Length of road before it on which the ego may change lanes [m], a constant."""
+    after: Annotated[Metres, Field(ge=15.0, le=300.0)] = 40.0
+    """Length of road behind it on which the ego returns [m], a constant."""
+
+
 class PlaceSection(ShapedSection):
     """Where a participant starts and goes, where a category chooses one of several."""
 
@@ -109,6 +123,8 @@ class ParticipantSection(ShapedSection):
     """End of the route; required for the ego."""
     lane_change: RouteChangeSection | None = None
     """Lane change of the ego's route; those of others are events."""
+    passes: PassSection | None = None
+    """What stands in the ego's lane and is passed, by the lane beside."""
     place_by: Word | None = None
     """Category that chooses one of ``places`` in each evaluation."""
     places: dict[Word, PlaceSection] = {}

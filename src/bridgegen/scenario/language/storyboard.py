@@ -44,8 +44,10 @@ from bridgegen.scenario.language.story_schema import (
     EventSection,
     GhostSection,
     ParticipantSection,
+    PassSection,
     RouteChangeSection,
     WaypointSection,
+    WorksSection,
 )
 from bridgegen.scenario.named_models import MODELS, body_of
 from bridgegen.scenario.participants import PARTICIPANTS, TYPES, Body
@@ -75,6 +77,13 @@ DOOR_WAY = 0.8819 * 2.0 * DOOR_BEND
 
 WEATHER_STEPS = 5
 """Steps of a weather that changes over a time."""
+
+BEFORE = 5.0
+"""Distance before what it passes at which the ego is beside its lane [m]: its front is 3.7 m ahead
+of its rear axle; ours."""
+
+BEHIND = 3.0
+"""Distance behind it from which on the ego returns [m]: its rear is 1 m behind the axle; ours."""
 
 _OF_EVENTS = ("after", "began")
 _OF_DISTANCE = {
@@ -165,12 +174,15 @@ class Storyboard:
                     (*path, "off_crosswalk"),
                 )
             self._check_driver(name, given, path)
-            if given.lane_change and (name != EGO or given.places):
+            way = "lane_change" if given.lane_change else "passes"
+            if (given.lane_change or given.passes) and (name != EGO or given.places):
                 self._report(
-                    "a lane_change is for the route of the ego, from one start to one end; others "
+                    f"a {way} is for the route of the ego, from one start to one end; others "
                     "change lanes by events",
-                    (*path, "lane_change"),
+                    (*path, way),
                 )
+            if given.lane_change and given.passes:
+                self._report("a route has a lane_change or passes something, not both", path)
             if given.places:
                 yield self._at_places(name, given, path)
             elif given.path:
@@ -226,6 +238,8 @@ class Storyboard:
             end = self._places.waypoint(given.end, (*path, "end"), above=True)
             if given.lane_change is not None:
                 change = self._route_change(start, end, given.lane_change, (*path, "lane_change"))
+            elif given.passes is not None and name == EGO:
+                change = self._way_round(start, end, given.passes, (*path, "passes"))
             self._check_route(name, start, end, given, path)
         elif name == EGO:
             self._report("the ego's route must have an end", path)
@@ -402,6 +416,75 @@ class Storyboard:
                     path,
                 )
         return (Waypoint("ramp", "in", 0.0) if merges else first, last)
+
+    def _way_round(
+        self, start: Waypoint, end: Waypoint, given: PassSection, path: Path
+    ) -> tuple[Waypoint, ...]:
+        """Return where the ego's route leaves its lane, must be beside it, returns, and is back."""
+        found = self._obstruction(given.around)
+        if found is None:
+            self._report(
+                "the ego passes a participant that stands on a lane at a constant distance, or "
+                f"road works that do, got '{given.around}'",
+                (*path, "around"),
+            )
+            return ()
+        place, rear, front = found
+        on = [at for at in (start, end) if (at.leg, at.way) == (place.leg, place.way)]
+        if place.lane not in [at.lane for at in on]:
+            self._report(
+                f"what the ego passes is in its lane, but {given.around} is on {place}", path
+            )
+            return ()
+        lane, way = int(place.lane) - given.lanes, place.way
+        if lane < 1:
+            lane, way = 1, "in" if way == "out" else "out"
+        sign, at = (1.0 if place.way == "out" else -1.0), float(place.distance)
+        over, until = at - sign * (rear + BEFORE), at + sign * (front + BEHIND)
+        leaves, back = over - sign * given.before, until + sign * given.after
+        other = WaypointSection(leg=place.leg, way=way, lane=lane, distance=max(over, 0.0))
+        beside = self._places.waypoint(other, path)
+        for far, near, which in (
+            *((leaves, edge, "start") for edge in self._places.range_of(start.distance)),
+            *((edge, back, "end") for edge in self._places.range_of(end.distance)),
+        ):
+            if (start if which == "start" else end) in on and not sign * (far - near) > 0.0:
+                self._report(
+                    f"the ego leaves its lane at {leaves:g} m and is back at {back:g} m, between "
+                    f"its route's start and end, but its {which} may be at "
+                    f"{near if which == 'start' else far:g} m",
+                    path,
+                )
+                break
+        own = replace(place, offset=0.0)
+        return (
+            replace(own, distance=leaves),
+            replace(beside, distance=over),
+            replace(beside, distance=until),
+            replace(own, distance=back),
+        )
+
+    def _obstruction(self, name: str) -> tuple[Waypoint, float, float] | None:
+        """Return where what stands in a lane is, and how far it reaches back and ahead [m]."""
+        document = self._quantities.document
+        for key, data in entries(document, "road_works"):
+            works = section(WorksSection, data) if key == name else None
+            if works is not None and not isinstance(works.start.distance, str):
+                at = self._places.waypoint(works.start, ("road_works", key, "start"))
+                return (at, 0.0, works.length) if isinstance(at.lane, int) else None
+        for key, data in entries(document, "participants"):
+            given = section(ParticipantSection, data) if key == name else None
+            if given is None or given.start is None or self._moves(name, given):
+                continue
+            at = self._places.waypoint(given.start, ("participants", key, "start"))
+            bodies = [_body(given) or body_of(given.model or given.type)]
+            bodies += map(body_of, self._choices.types(given))
+            rear, front = (max(getattr(body, end) for body in bodies) for end in ("rear", "front"))
+            if given.heading != 0.0:
+                rear = front = max(rear, front)
+            if isinstance(at.lane, int) and not isinstance(at.distance, str):
+                return at, rear, front
+        return None
 
     def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check model and own body, if there are: what the type's has none of, it has not."""

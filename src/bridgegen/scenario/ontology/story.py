@@ -54,7 +54,7 @@ CONDITIONS = {
 }
 """The class of each kind of condition."""
 
-ROUTE_CHANGE = ("has_change_start", "has_change_end")
+ROUTE_CHANGE = ("has_change_start", "has_change_end", "has_return_start", "has_return_end")
 """Links of a route to the places between which it changes lanes, if it does."""
 
 EGO = "ego"

@@ -107,7 +107,7 @@ class Roads(NamedTuple):
     of gravity [m/s²] what acts against the motion, and to the right, and the share [1] by which it
     presses less on the road; L is 0 on a network whose roads are level. ``bends`` ``(K, L)`` and
     ``drops`` ``(L,)`` are where the next bend of each path is, and the next lower speed limit; see
-    ``ego._speed_kernels``. ``changes`` ``(V, 5)`` is where the ego's route may change lanes, see
+    ``ego._speed_kernels``. ``changes`` ``(V, 8)`` is where the ego's route may change lanes, see
     ``ego._gap_kernels``. ``lanes`` is ``lane_tables.lanes_along``, and ``pieces`` and
     what follows them are `bridgegen.drivers.map_grid.Grid`; without rows unless a driver wants
     them.

@@ -14,7 +14,8 @@ import numpy as np
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
-from bridgegen.openx.opendrive.lane_changes import change_lanes
+from bridgegen.openx.opendrive.geometry import reference_line
+from bridgegen.openx.opendrive.lane_changes import change_lanes, leads_round
 from bridgegen.openx.opendrive.lane_graph import LaneGraph
 from bridgegen.openx.opendrive.lanes import borders, lane_along, lane_at, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
@@ -91,7 +92,11 @@ class Lanes:
         Raises:
             InputError: one is not on a lane, or no lane leads from one to the next.
         """
-        self.ways.append(self._way([self._on_lane(spot) for spot in spots]))
+        places = [self._on_lane(spot) for spot in spots]
+        # One that passes something on the lane beside is back on its own.
+        self.ways.append(
+            self._way(places[::5] if leads_round(self.graph.model, places) else places)
+        )
 
     def locate(self, spot: Spot) -> tuple[int, int, float, float, int]:
         """Return number of the road, lane id, s, how far left of the lane's centre [m], and a way.
@@ -324,6 +329,10 @@ class Lanes:
             a, b, c, d = piece.taper.t
             local = s - min(piece.s, piece.s_end)
             t = a + local * (b + local * (c + local * d))
+        elif piece.is_aside:  # at a constant t
+            line = reference_line(road, s[:1])
+            x, y = piece.x - line.x, piece.y - line.y
+            t = t * 0.0 + y * elementary.cos(line.h) - x * elementary.sin(line.h)
         drivable = [lane.id for lane in road.sections[node.section].lanes if lane.drivable]
         sides = [edges[0], *(edges[item] for item in drivable)]
         up, down = np.max(sides, axis=0) - t, t - np.min(sides, axis=0)

@@ -77,6 +77,7 @@ def _find_zones(zones: Float, number: int, program: Program, ways: Ways) -> None
     from bridgegen.drivers._yielding_kernels import (  # numba is slow to import
         ACROSS,
         HOW,
+        OTHER_ENTERS,
         find_zone,
     )
 
@@ -96,8 +97,13 @@ def _find_zones(zones: Float, number: int, program: Program, ways: Ways) -> None
             bodies[other],
             zones[other],
         )
-        if other == 0 and ways.turnings and zones[other, HOW] != ACROSS:
-            zones[other] = np.inf  # where the ego changes lanes, and that it will, nobody knows
+        turning = ways.turnings.get(other) if other == 0 else None
+        if turning is None:
+            continue
+        # Where the ego changes lanes, and that it will, nobody knows; nor that it comes this way.
+        meets = turning.begins <= zones[other, OTHER_ENTERS] <= turning.returns + turning.back
+        if zones[other, HOW] != ACROSS or (turning.against and meets):
+            zones[other] = np.inf
 
 
 def _follows(ways: Ways, number: int, other: int) -> bool:

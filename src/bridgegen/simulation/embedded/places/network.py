@@ -12,6 +12,7 @@ from bridgegen.drivers.interface import RoadMap
 from bridgegen.drivers.kinds import IS_CYCLE, IS_PEDESTRIAN
 from bridgegen.drivers.lane_tables import CORRIDOR, LANE, corridor_along, lanes_along
 from bridgegen.drivers.map_grid import grid_of, no_grid
+from bridgegen.drivers.right_of_way import PASSES
 from bridgegen.drivers.road_map import road_map
 from bridgegen.drivers.scene import Scene, beside, kerbs, stacked, stop_lines, survey
 from bridgegen.openx.opendrive.lane_graph import Cells, Ground
@@ -461,9 +462,11 @@ def _scene(program: Program, model: OpenDrive, ways: Ways) -> Scene:
     path = ways.paths[0]
     ranks = np.zeros(len(ways.routes), np.int64)  # others than entities have none
     ranks[: len(program.sirens)] = program.sirens - ways.off_road
-    return survey(
+    found = survey(
         model, ways.routes, path.table, path.step, program.lights, starts, program.bodies, ranks
     )
+    found.claims[:, 0, 0] += PASSES * any(each.against for each in ways.turnings.values())
+    return found
 
 
 def _lanes_along(model: OpenDrive, ways: Ways) -> Float:

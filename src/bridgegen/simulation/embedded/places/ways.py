@@ -16,6 +16,8 @@ from bridgegen.openx.opendrive.lane_changes import (
     USUAL,
     Turning,
     coming,
+    leads_round,
+    passings,
     plan_with_changes,
     turnings,
 )
@@ -54,6 +56,9 @@ CHANGE_TIME = 4.6
 """Duration of a lane change at the speed limit [s]; source: Toledo and Zohar, Transportation
 Research Record 1999 (2007) 71-78, the mean."""
 
+PASSES = 6
+"""Number of waypoints of a route that passes something, see `leads_round`."""
+
 SEES_BACK = 250.0
 """Length of the lane that a driver who wants to change to it looks back along [m]; ours."""
 
@@ -82,7 +87,7 @@ class Ways:
         numbers: ``(R + 1, S)`` int64, the path of a route from a node on; route 0 is no route.
         turnings: where the ego's route changes lanes in a stated stretch, its ways by where it
             begins to, by the numbers of their paths; the first is its first path.
-        changes: ``(V, 5)`` the same as kernels read it, see ``_gap_kernels``.
+        changes: ``(V, 8)`` the same as kernels read it, see ``_gap_kernels``.
 
     Raises:
         InputError: a position that is not on a road, or a way that no lane leads along.
@@ -102,7 +107,7 @@ class Ways:
         self.numbers: Int = np.empty((len(program.waypoints) + 1, 0), dtype=np.int64)
         self.turnings: dict[int, Turning] = {}
         self._turnings: list[Turning] = []
-        self.changes = np.empty((0, 5))
+        self.changes = np.empty((0, 8))
         for number, spec in enumerate(program.paths):
             try:
                 if isinstance(spec, AlongTrajectory):
@@ -205,14 +210,18 @@ class Ways:
         spec = program.paths[0]
         assert isinstance(spec, AlongLanes)
         by = Place(*_place(program, spec.via[2]))
-        end = Place(*_end(self._model, spec.via[3].road, spec.via[3].lane, entry=False))
+        last = by if len(spec.via) == PASSES else Place(*_place(program, spec.via[3]))
+        end = Place(*_end(self._model, last.road_id, last.lane_id, entry=False))
         target = len(self.paths)
         self._add_line(sampled(coming(self._model, by, end, SEES_BACK)), ENDS)
         for kept in (self.routes, self.station, self.sides):
             kept.pop()  # of entities and trajectories alone
         self.changes = np.array(
             [
-                (at, turning.begins, turning.length, turning.across, target)
+                (
+                    *(at, turning.begins, turning.length, turning.across, target),
+                    *(turning.returns, turning.back, turning.against),
+                )
                 for at, turning in self.turnings.items()
             ]
         )
@@ -241,20 +250,28 @@ class Ways:
 
     def _find_turnings(self, spec: AlongLanes) -> list[Turning]:
         """Return where the ego's route may change lanes between two waypoints that are no ends."""
-        if len(spec.via) != 4 or self._program.driver == STORYBOARD:
+        if len(spec.via) not in (4, PASSES) or self._program.driver == STORYBOARD:
             return []
-        _, begin, by, last = (Place(*_place(self._program, point)) for point in spec.via)
+        _, *via, last = (Place(*_place(self._program, point)) for point in spec.via)
+        begin, by = via[:2]
+        passes = leads_round(self._model, [begin, *via, last])
+        if not passes and (len(spec.via) == PASSES or self._leads(begin, by)):
+            return []
+        start = Place(*_end(self._model, spec.start.road, spec.start.lane, entry=True))
+        end = Place(*_end(self._model, last.road_id, last.lane_id, entry=False))
+        road = self._model.road(by.road_id)
+        number = section_index(road, by.s)
+        limit = float(speed_limits(road, number, by.lane_id, np.array([by.s]))[0])
+        usual = USUAL if math.isinf(limit) else CHANGE_TIME * limit
+        return (passings if passes else turnings)(self._model, [start, *via, end], usual)
+
+    def _leads(self, start: Place, end: Place) -> bool:
+        """Return whether lanes lead from one place to another."""
         try:
-            leg(self._model, begin, by)
+            leg(self._model, start, end)
         except InputError:
-            start = Place(*_end(self._model, spec.start.road, spec.start.lane, entry=True))
-            end = Place(*_end(self._model, last.road_id, last.lane_id, entry=False))
-            road = self._model.road(by.road_id)
-            number = section_index(road, by.s)
-            limit = float(speed_limits(road, number, by.lane_id, np.array([by.s]))[0])
-            usual = USUAL if math.isinf(limit) else CHANGE_TIME * limit
-            return turnings(self._model, [start, begin, by, end], usual)
-        return []
+            return False
+        return True
 
     def _along(self, spec: AlongLanes) -> Route:
         """Plan from where the start's road is entered to where the last waypoint's road is left.
@@ -262,6 +279,10 @@ class Ways:
         Without a route, an entity goes straight on.
         """
         start, waypoints = spec.start, list(spec.via)
+        places = [Place(*_place(self._program, point)) for point in waypoints]
+        if leads_round(self._model, places):
+            ends = (Place(*_end(self._model, *places[i][:2], entry=i == 0)) for i in (0, -1))
+            return plan_with_changes(self._model, [next(ends), *places[1:-1], next(ends)])
         if not waypoints:
             return self._onward(start.road, start.lane, _known(self._program, start)[1])
         while waypoints and (waypoints[0].road, waypoints[0].lane) == (start.road, start.lane):
