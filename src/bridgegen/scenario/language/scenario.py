@@ -304,6 +304,8 @@ class LogicalScenario(SearchedScenario):
             models,
             ways,
             self.story.ghosts,
+            [ghost.mirrors for ghost in self.story.ghosts if ghost.mirrors],
+            self.story.tracker,
             changes,
             self.criteria,
             self.clauses,

@@ -20,6 +20,7 @@ from bridgegen.scenario.language.schema_types import Formula, ShapedSection, Tex
 from bridgegen.scenario.language.story import (
     CONDITIONS,
     GHOST_UNITS,
+    TRACKER_UNITS,
     Action,
     Arrival,
     Change,
@@ -42,6 +43,7 @@ from bridgegen.scenario.language.story_schema import (
     GhostSection,
     ParticipantSection,
     RouteChangeSection,
+    TrackerSection,
     WaypointSection,
 )
 from bridgegen.scenario.named_models import MODELS, body_of
@@ -76,6 +78,7 @@ class Storyboard:
         participants: as ``LogicalScenario`` holds them.
         events: likewise.
         ghosts: likewise.
+        tracker: likewise, its numbers.
         known: the participants' names, also of those that are described wrongly.
         derived: the weathers between, where one changes over a time.
 
@@ -105,6 +108,7 @@ class Storyboard:
         self._acting = {participant.name: participant for participant in self.participants}
         self.events = tuple(self._events())
         self.ghosts = tuple(self._ghosts())
+        self.tracker = self._tracker()
 
     # -- participants --------------------------------------------------------------------------
 
@@ -273,16 +277,40 @@ class Storyboard:
                 continue
             if not name.isidentifier() or not name.isascii():
                 self._report(f"a ghost's name is a word, got '{name}'", path)
-            if (given.at is None) == (given.rate is None):
-                self._report(f"ghost {name} must have a place (at) or a rate, one of the two", path)
+            if sum(item is not None for item in (given.at, given.rate, given.mirrors)) != 1:
+                self._report(
+                    f"ghost {name} must have a place (at), a rate, or mirrors: one of them", path
+                )
+            elif (given.mirrors is None) != (given.aside is None):
+                self._report(f"ghost {name} must have mirrors and aside, or neither", path)
+            if given.mirrors == EGO or given.mirrors not in (None, *self.known):
+                self._report(
+                    f"{name}.mirrors must name another participant, got '{given.mirrors}'", path
+                )
             numbers = {w: value for w in GHOST_UNITS if (value := getattr(given, w)) is not None}
             for word, value in numbers.items():
-                above = word in ("rate", "appears", "lifetime")
-                self._check(value, GHOST_UNITS[word], (*path, word), above=above)
+                above = word in ("rate", "appears", "lifetime", "share")
+                low = -math.inf if word == "aside" else 0.0
+                self._check(value, GHOST_UNITS[word], (*path, word), low=low, above=above)
             near, far = given.vanishes, given.appears
             if not isinstance(near, str) and not isinstance(far, str) and near >= far:
                 self._report(f"vanishes < appears [m] must hold, got {near:g} and {far:g}", path)
-            yield Ghost(name, given.type, numbers)
+            yield Ghost(name, given.type, numbers, given.mirrors or "")
+
+    def _tracker(self) -> dict[str, Quantity]:
+        given = section(TrackerSection, dict(entries(self._quantities.document, "tracker")) or None)
+        if given is None:
+            return {}
+        numbers: dict[str, Quantity] = {word: getattr(given, word) for word in TRACKER_UNITS}
+        for word, value in numbers.items():
+            low = 1.0 if word in ("confirm", "of") else 0.0
+            self._check(value, TRACKER_UNITS[word], ("tracker", word), low=low)
+        least, most = given.confirm, given.of
+        if not isinstance(least, str) and not isinstance(most, str) and least > most:
+            self._report(f"confirm <= of must hold, got {least:g} and {most:g}", ("tracker",))
+        if (given.angle == 0.0) != (given.range == 0.0):
+            self._report("tracker must have angle and range, or neither", ("tracker",))
+        return numbers
 
     def _route_change(
         self, start: Waypoint, end: Waypoint, given: RouteChangeSection, path: Path

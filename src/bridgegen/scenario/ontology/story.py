@@ -7,6 +7,7 @@ import pyoxigraph as ox
 
 from bridgegen.base.errors import OntologyError
 from bridgegen.scenario.language.adversary import LOOKING
+from bridgegen.scenario.language.roads import Quantity
 from bridgegen.scenario.language.story import (
     Action,
     Arrival,
@@ -124,15 +125,22 @@ def add_participant(
     return node
 
 
-def add_ghosts(builder: Builder, ghosts: Iterable[Ghost]) -> None:
-    """Add the false positives of the ego's sensors, which its controller has."""
+def add_perception(
+    builder: Builder, ghosts: Iterable[Ghost], tracker: Mapping[str, Quantity]
+) -> None:
+    """Add the false positives of the ego's sensors and its tracker, which its controller has."""
+    controller = builder.iri(f"{EGO}_controller")
+    for name, value in tracker.items():
+        builder.quantity(controller, f"has_tracker_{name}", value)
     for ghost in ghosts:
         node = builder.node(ghost.name, "Ghost")
         builder.put(node, "has_name", ghost.name)
         builder.put(node, "has_ghost_type", ghost.type)
+        if ghost.mirrors:
+            builder.put(node, "has_ghost_mirrors", ghost.mirrors)
         for name, value in ghost.numbers.items():
             builder.quantity(node, f"has_ghost_{name}", value)
-        builder.put(builder.iri(f"{EGO}_controller"), "has_ghost", node)
+        builder.put(controller, "has_ghost", node)
 
 
 def _add_body(builder: Builder, node: ox.NamedNode, body: Body) -> None:

@@ -1,17 +1,17 @@
 """OWL2OpenSCENARIO, its entities: bodies and drivers."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
 from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import EntityBody, entity_body
-from bridgegen.openx.openscenario.declarations import DRIVER, GHOST, IDEAL, ODD, SIREN
+from bridgegen.openx.openscenario.declarations import DRIVER, GHOST, IDEAL, ODD, SIREN, TRACKER
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity, quoted_element
 from bridgegen.openx.openscenario.values import Double, format_double
-from bridgegen.scenario.language.story import GHOST_UNITS
+from bridgegen.scenario.language.story import GHOST_UNITS, TRACKER_UNITS
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import Subject
 from bridgegen.scenario.participants import PARTICIPANTS, Body, ParticipantKind
@@ -138,15 +138,23 @@ def _controller(
     said = [osc.Property(DRIVER, driver), osc.Property("esminiController", _ESMINI_CONTROLLER)]
     if individuals.optional_text(node, "has_ideal_stages") is not None:
         said.append(osc.Property(IDEAL, plain_text(individuals, node, "has_ideal_stages")))
+
+    def state(subject: Subject, prefix: str, key: str, words: Iterable[str]) -> None:
+        for word in words:
+            if individuals.optional_number(subject, f"{prefix}_{word}") is not None:
+                value = quantities.get(subject, f"{prefix}_{word}")
+                text = format_double(value) if isinstance(value, float) else value
+                said.append(osc.Property(f"{key}.{word}", text))
+
     for ghost in individuals.links(node, "has_ghost"):
         key = f"{GHOST}.{plain_text(individuals, ghost, 'has_name')}"
         kind = plain_text(individuals, ghost, "has_ghost_type")
         said.append(osc.Property(f"{key}.type", kind))
-        for word in GHOST_UNITS:
-            if individuals.optional_number(ghost, f"has_ghost_{word}") is not None:
-                value = quantities.get(ghost, f"has_ghost_{word}")
-                text = format_double(value) if isinstance(value, float) else value
-                said.append(osc.Property(f"{key}.{word}", text))
+        if individuals.optional_text(ghost, "has_ghost_mirrors") is not None:
+            whose = plain_text(individuals, ghost, "has_ghost_mirrors")
+            said.append(osc.Property(f"{key}.mirrors", whose))
+        state(ghost, "has_ghost", key, GHOST_UNITS)
+    state(node, "has_tracker", TRACKER, TRACKER_UNITS)
     properties = osc.Properties(tuple(said))
     name = plain_text(individuals, node, "has_name")
     return osc.ObjectController(osc.Controller(name, properties))
