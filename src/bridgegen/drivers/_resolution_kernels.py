@@ -1,9 +1,10 @@
 """What the sensors do not resolve: bodies close to each other give one detection.
 
 Two bodies are unresolved where their gaps in bearing and in range, between their edges as the
-sensors see them, are both within a stated resolution. The greater of the two is then detected with
-a box round both, and the other one is missed: so its track coasts and is dropped, and begins anew
-where they part. Once one, they part only beyond `SPLIT` times the resolution.
+sensors see them, are both within a stated resolution. The greater of the two is then detected, with
+a box round both or, as the scenario states, less of it down to its own, which masks the other one;
+that is missed: so its track coasts and is dropped, and begins anew where they part. Once one, they
+part only beyond `SPLIT` times the resolution.
 
 Source: S. Blackman, R. Popoli, Design and Analysis of Modern Tracking Systems (1999), on closely
 spaced targets; that resolution is by cells of range and angle, M. I. Skolnik, Introduction to Radar
@@ -19,7 +20,7 @@ from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._occlusion_kernels import BEARING, COS, DX, DY, HIGH, LOW, SIN, D
 from bridgegen.drivers._sensor_kernels import INTO
-from bridgegen.drivers._tracking_kernels import ANGLE, RANGE
+from bridgegen.drivers._tracking_kernels import ANGLE, EXTENT, RANGE
 from bridgegen.drivers.kinds import HEADING, LENGTH, MISSED, SEEN_BY, WIDTH, X, Y
 
 SPLIT = 1.5  # of the resolution: those that are one part beyond it
@@ -55,8 +56,8 @@ def leads(memory, bodies, a, b):
 
 
 @kernel
-def enclose(detections, k, a, b):
-    """Enlarge the box that body a is detected with, so that it encloses that of b."""
+def enclose(detections, k, a, b, extent):
+    """Enlarge the box that body a is detected with by a share of what it lacks to enclose b's."""
     cosine, sine = (
         elementary.cos(detections[a, k, HEADING]),
         elementary.sin(detections[a, k, HEADING]),
@@ -72,7 +73,8 @@ def enclose(detections, k, a, b):
         half = 0.5 * (length * c + width * s) if axis == 0 else 0.5 * (length * s + width * c)
         column = LENGTH if axis == 0 else WIDTH
         own = 0.5 * detections[a, k, column]
-        low, high = min(-own, at - half), max(own, at + half)
+        low = extent * min(at - half + own, 0.0) - own
+        high = extent * max(at + half - own, 0.0) + own
         detections[a, k, column] = high - low
         middle = 0.5 * (low + high)
         shifts = (middle, 0.0) if axis == 0 else (shifts[0], middle)
@@ -110,7 +112,7 @@ def merge(tracker, bodies, memory, detections, k):
         while memory[root, INTO] > 0.0:
             root = int(memory[root, INTO])
         if root != e:
-            enclose(detections, k, root, e)
+            enclose(detections, k, root, e, tracker[EXTENT])
     for e in range(1, memory.shape[0]):
         if memory[e, INTO] > 0.0:
             detections[e, k, SEEN_BY] = MISSED

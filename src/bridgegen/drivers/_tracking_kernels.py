@@ -23,13 +23,13 @@ NONE, TENTATIVE, CONFIRMED, COASTING = 0, 1, 2, 3
 HISTORY, PX, PY = 0, 1, 4
 MEMORY = 7
 
-ANGLE, RANGE, CONFIRM, OF, COAST = range(5)
-"""Columns of ``Plan.tracker`` ``(5,)``, slots of what the scenario states, and items of what
+ANGLE, RANGE, EXTENT, CONFIRM, OF, COAST = range(6)
+"""Columns of ``Plan.tracker`` ``(6,)``, slots of what the scenario states, and items of what
 `settings` returns: gaps in bearing [rad; the slot's in degrees] and range [m] up to which two
-bodies are one; in how many of the last frames a track must be seen to be confirmed, and of how
-many; how long it lives unseen [s]."""
+bodies are one; how far its box grows to enclose both, 0 to 1; in how many of the last frames a
+track must be seen to be confirmed, and of how many; how long it lives unseen [s]."""
 
-TRACKER = (0.0, 0.0, 3.0, 5.0, 1.0)
+TRACKER = (0.0, 0.0, 1.0, 3.0, 5.0, 1.0)
 """What holds unless a scenario states otherwise: all is resolved, 3 of 5 frames confirm, 1 s.
 Source of M of N: S. Blackman, R. Popoli, Design and Analysis of Modern Tracking Systems (1999)."""
 
@@ -44,9 +44,9 @@ def settings(tracker, slots):
     """Return what the scenario states of the tracker, else `TRACKER`; the angle in radians."""
     if len(tracker) == 0:
         return TRACKER
-    angle = math.radians(slots[tracker[ANGLE]])
-    frames = min(max(slots[tracker[OF]], 1.0), float(MOST_FRAMES))
-    return angle, slots[tracker[RANGE]], slots[tracker[CONFIRM]], frames, slots[tracker[COAST]]
+    angle, extent = math.radians(slots[tracker[ANGLE]]), slots[tracker[EXTENT]]
+    frames, coast = min(slots[tracker[OF]], float(MOST_FRAMES)), slots[tracker[COAST]]
+    return angle, slots[tracker[RANGE]], extent, slots[tracker[CONFIRM]], frames, coast
 
 
 @kernel

@@ -399,7 +399,9 @@ GHOST_UNITS = {
 }  # fmt: skip
 """The numbers of a ghost, with their units; see ``GhostSection``."""
 
-TRACKER_UNITS = {"angle": "deg", "range": "m", "confirm": "1", "of": "1", "coast": "s"}
+TRACKER_UNITS = {
+    "angle": "deg", "range": "m", "extent": "1", "confirm": "1", "of": "1", "coast": "s",
+}  # fmt: skip
 """The numbers of the ego's tracker, with their units; see ``TrackerSection``."""
 
 

@@ -309,6 +309,8 @@ class TrackerSection(ShapedSection):
     """Gap in bearing up to which two bodies are detected as one [deg]."""
     range: Length = 0.0
     """Gap in range up to which two bodies are detected as one [m]."""
+    extent: Ratio = 1.0
+    """Share by which the greater one's box grows to enclose both [1]; at 0 it masks the other."""
     confirm: Ratio = 3.0
     """Number of frames, of the last ``of``, that must see a track before it is confirmed."""
     of: Ratio = 5.0

@@ -261,7 +261,7 @@ def tracker(controllers: Controllers, tables: Tables) -> Int:
             if word not in TRACKER_UNITS:
                 raise InputError(f"{where}: a tracker has {', '.join(TRACKER_UNITS)}")
             low = 1.0 if word in ("confirm", "of") else 0.0
-            high = float(tracking.MOST_FRAMES) if word in ("confirm", "of") else math.inf
+            high = {"extent": 1.0, "of": float(tracking.MOST_FRAMES)}.get(word, math.inf)
             found[word] = _slot(tables, item.value, f"{where} [{TRACKER_UNITS[word]}]", low, high)
     usual = zip(TRACKER_UNITS, tracking.TRACKER, strict=True) if found else ()
     slots = [found[word] if word in found else tables.slot(value) for word, value in usual]
