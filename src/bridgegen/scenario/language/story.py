@@ -16,7 +16,7 @@ STRIPS = ("sidewalk", "shoulder")
 
 def in_words(value: Quantity, unit: str) -> str:
     """Return a parameter's name as it is, a number with its unit."""
-    return value if isinstance(value, str) else f"{value:g} {unit}"
+    return value if isinstance(value, str) else f"{value:g} {unit}".removesuffix(" 1")
 
 
 def beside(offset: Quantity) -> str:
@@ -403,6 +403,9 @@ TRACKER_UNITS = {
     "angle": "deg", "range": "m", "extent": "1", "confirm": "1", "of": "1", "coast": "s",
 }  # fmt: skip
 """The numbers of the ego's tracker, with their units; see ``TrackerSection``."""
+
+MOST_FRAMES = 30
+"""Number of frames of a track's history at most."""
 
 
 @dataclass(frozen=True)

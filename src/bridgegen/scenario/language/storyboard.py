@@ -20,6 +20,7 @@ from bridgegen.scenario.language.schema_types import Formula, ShapedSection, Tex
 from bridgegen.scenario.language.story import (
     CONDITIONS,
     GHOST_UNITS,
+    MOST_FRAMES,
     TRACKER_UNITS,
     Action,
     Arrival,
@@ -305,6 +306,11 @@ class Storyboard:
         for word, value in numbers.items():
             low = 1.0 if word in ("confirm", "of") else 0.0
             self._check(value, TRACKER_UNITS[word], ("tracker", word), low=low)
+        for word, limit in (("extent", 1.0), ("of", MOST_FRAMES)):
+            highest = self._places.range_of(numbers[word])[1]
+            if limit < highest < math.inf:
+                what = f"tracker.{word} [1] must be at most {limit:g}, got {highest:g}"
+                self._report(what, ("tracker", word))
         least, most = given.confirm, given.of
         if not isinstance(least, str) and not isinstance(most, str) and least > most:
             self._report(f"confirm <= of must hold, got {least:g} and {most:g}", ("tracker",))
