@@ -25,14 +25,7 @@ from bridgegen.drivers._occlusion_kernels import DX, DY, D
 from bridgegen.drivers._path_kernels import pose, project
 from bridgegen.drivers._perception_kernels import COLOURED, blank, frame_at
 from bridgegen.drivers._random_kernels import block, unit
-from bridgegen.drivers._sensor_kernels import (
-    BY_LIDAR,
-    LIDAR_ACROSS,
-    LIDAR_ALONG,
-    SIZE,
-    TURN,
-    draw,
-)
+from bridgegen.drivers._sensor_kernels import BY_LIDAR, LIDAR_ACROSS, LIDAR_ALONG, SIZE, TURN, draw
 
 AT, RATE, APPEARS, VANISHES, LIFETIME, ASIDE, SHARE, LONG, WIDE, WHAT, MIRRORS = range(11)
 """Columns of ``Plan.ghosts`` ``(G, 11)``: slots of the station of its near end after the ego's
@@ -75,10 +68,10 @@ def is_reported(frame, moved, row, slots, front, key, e, memory):
 
 @kernel
 def image(k, row, plan, roads, state, record):
-    """Return the station [m] and offset [m] of the centre of a body's image, and its heading.
+    """Return the station [m] and offset [m] of the centre of a body's image.
 
-    The offset is NaN where there is none: the body is out of range, or not on the ego's side of the
-    mirror. The mirror follows the route; in a bend the image is that of a plane along its tangent.
+    The offset is NaN where there is none: the body is out of range, or beyond the mirror from the
+    route. The mirror follows the route; in a bend the image is that of a plane along its tangent.
     """
     o, mirror = row[MIRRORS], state.slots[row[ASIDE]]
     path, n, ds = roads.paths[0], roads.counts[0], roads.steps[0]
@@ -89,11 +82,9 @@ def image(k, row, plan, roads, state, record):
     guess = state.station[0] + (x - record.x[0, k]) * elementary.cos(record.h[0, k])
     guess += (y - record.y[0, k]) * elementary.sin(record.h[0, k])
     station, aside = project(path, n, ds, guess, x, y)
-    _, _, h = pose(path, n, ds, station)
-    _, own = project(path, n, ds, state.station[0], record.x[0, k], record.y[0, k])
-    if state.sensors[o, D] == math.inf or (mirror - aside) * (mirror - own) <= 0.0:
+    if state.sensors[o, D] == math.inf or (mirror - aside) * mirror <= 0.0:
         aside = math.nan
-    return station, 2.0 * mirror - aside, 2.0 * h - record.h[o, k]
+    return station, 2.0 * mirror - aside
 
 
 @kernel
@@ -113,9 +104,9 @@ def haunt(k, plan, roads, state, record):
         blank(record.detections, e, k, column.MISSED if frame >= 0 else column.NO_FRAME)
         if plan.ideal_perception:
             continue
-        station = offset = turn = 0.0
+        offset = 0.0
         if row[MIRRORS] >= 0 and frame >= 0:
-            station, offset, turn = image(k, row, plan, roads, state, record)
+            station, offset = image(k, row, plan, roads, state, record)
             memory[e, STATION] = station - 0.5 * state.slots[row[LONG]]
         elif k == 0 and row[AT] >= 0:
             memory[e, STATION] = state.station[0] + state.slots[row[AT]]
@@ -125,9 +116,10 @@ def haunt(k, plan, roads, state, record):
             continue
         draw(memory, e, state.key[0], frame, renew, keep)
         moved = record.v[0, k] * elapsed
-        absent = state.on[0] != 0 or math.isnan(offset)
-        if absent or not is_reported(
-            frame, moved, row, state.slots, front, state.key[0], e, memory
+        if (
+            math.isnan(offset)
+            or state.on[0] != 0
+            or not is_reported(frame, moved, row, state.slots, front, state.key[0], e, memory)
         ):
             tracking.miss(tracks, memory, e, tracker)
             continue
@@ -136,7 +128,7 @@ def haunt(k, plan, roads, state, record):
         x, y, h = pose(roads.paths[0], roads.counts[0], roads.steps[0], middle)
         if row[MIRRORS] >= 0:
             x, y = x - offset * elementary.sin(h), y + offset * elementary.cos(h)
-            h = turn
+            h = 2.0 * h - record.h[row[MIRRORS], k]
         error, stretch = physics.CAMERA_FLOOR, max(1.0 + physics.BOX_ERROR * memory[e, SIZE], 0.5)
         x, y = x + error * memory[e, LIDAR_ALONG], y + error * memory[e, LIDAR_ACROSS]
         h += physics.HEADING_ERROR * memory[e, TURN]
@@ -146,7 +138,5 @@ def haunt(k, plan, roads, state, record):
         seen[column.CONFIDENCE] = sure
         seen[column.X], seen[column.Y], seen[column.HEADING] = x, y, h
         seen[column.LENGTH], seen[column.WIDTH] = length, width
-        variance = COLOURED * error * error
-        tracking.see(
-            tracks, memory, e, x, y, h, length, width, row[WHAT], sure, variance, variance, tracker
-        )
+        var = COLOURED * error * error
+        tracking.see(tracks, memory, e, x, y, h, length, width, row[WHAT], sure, var, var, tracker)

@@ -33,7 +33,7 @@ from bridgegen.drivers._physics_kernels import (
     MOUNT,
 )
 from bridgegen.drivers._resolution_kernels import merge
-from bridgegen.drivers._sensor_kernels import DRAWN, MEMORY, VAR_X, VAR_Y, draw, observe
+from bridgegen.drivers._sensor_kernels import DRAWN, INTO, MEMORY, VAR_X, VAR_Y, draw, observe
 from bridgegen.drivers.kinds import (
     BOTH,
     CONFIDENCE,
@@ -139,10 +139,8 @@ def look(k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, tra
          tracks, detections):  # fmt: skip
     """Take a sensor frame: fill its detections, and update the tracks."""
     elapsed = max(dt, FRAME)
-    renew, keep = (
-        1.0 - elementary.exp(-elapsed / DROPOUT_TIME),
-        elementary.exp(-elapsed / ERROR_TIME),
-    )
+    renew = 1.0 - elementary.exp(-elapsed / DROPOUT_TIME)
+    keep = elementary.exp(-elapsed / ERROR_TIME)
     near = place(k, present, x, y, h, bodies, memory)
     heading = elementary.cos(h[0, k]), elementary.sin(h[0, k])
     height = max(MOUNT * bodies[0, 7], LEAST_HEIGHT)
@@ -172,24 +170,16 @@ def look(k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, tra
     if tracker[tracking.ANGLE] > 0.0 and near > 1:
         merge(tracker, bodies, memory, detections, k)
     for e in range(1, x.shape[0]):
+        if memory[e, INTO] > 0.0:
+            blank(detections, e, k, MISSED)
         if detections[e, k, SEEN_BY] == MISSED:
             tracking.miss(tracks, memory, e, tracker)
             continue
-        tracking.see(
-            tracks,
-            memory,
-            e,
-            detections[e, k, X],
-            detections[e, k, Y],
-            detections[e, k, HEADING],
-            detections[e, k, LENGTH],
-            detections[e, k, WIDTH],
-            detections[e, k, KIND],
-            detections[e, k, CONFIDENCE],
-            memory[e, VAR_X],
-            memory[e, VAR_Y],
-            tracker,
-        )
+        px, py, turn = detections[e, k, X], detections[e, k, Y], detections[e, k, HEADING]
+        length, width = detections[e, k, LENGTH], detections[e, k, WIDTH]
+        kind, sure = detections[e, k, KIND], detections[e, k, CONFIDENCE]
+        vx, vy = memory[e, VAR_X], memory[e, VAR_Y]
+        tracking.see(tracks, memory, e, px, py, turn, length, width, kind, sure, vx, vy, tracker)
         tracks[e, tracking.LAMPS] = lamps[e]
 
 

@@ -1,14 +1,12 @@
 """What the sensors do not resolve: bodies close to each other give one detection.
 
 Two bodies are unresolved where their gaps in bearing and in range, between their edges as the
-sensors see them, are both within a stated resolution. The greater of the two is then detected, with
-a box round both or, as the scenario states, less of it down to its own, which masks the other one;
-that is missed: so its track coasts and is dropped, and begins anew where they part. Once one, they
-part only beyond `SPLIT` times the resolution.
+sensors see them, are both within a stated resolution. The greater of the two is then detected, in a
+box that grows by a stated share to hold both; the other one is missed, so its track coasts, is
+dropped, and begins anew where they part: beyond `SPLIT` times the resolution.
 
 Source: S. Blackman, R. Popoli, Design and Analysis of Modern Tracking Systems (1999), on closely
-spaced targets; that resolution is by cells of range and angle, M. I. Skolnik, Introduction to Radar
-Systems (2001). That the greater one stands for both, and the hysteresis, are ours.
+spaced targets. That the greater one leads, and the hysteresis, are ours.
 """
 
 # mypy: allow-untyped-defs
@@ -48,11 +46,15 @@ def gaps(memory, bodies, a, b):
 def leads(memory, bodies, a, b):
     """Return whether body a stands for both: the greater one; of equal ones the nearer one."""
     one, other = bodies[a, 0] * bodies[a, 1], bodies[b, 0] * bodies[b, 1]
-    if one != other:
-        return one > other
-    if memory[a, D] != memory[b, D]:
-        return memory[a, D] < memory[b, D]
-    return a < b
+    return (one, -memory[a, D], float(b)) > (other, -memory[b, D], float(a))
+
+
+@kernel
+def grow(own, at, half, extent):
+    """Return size and middle of ±own, grown by a share of what it lacks to hold at ± half."""
+    low = extent * min(at - half + own, 0.0) - own
+    high = extent * max(at + half - own, 0.0) + own
+    return high - low, 0.5 * (low + high)
 
 
 @kernel
@@ -66,32 +68,20 @@ def enclose(detections, k, a, b, extent):
     c, s = abs(elementary.cos(turn)), abs(elementary.sin(turn))
     dx = detections[b, k, X] - detections[a, k, X]
     dy = detections[b, k, Y] - detections[a, k, Y]
-    length, width = detections[b, k, LENGTH], detections[b, k, WIDTH]
-    shifts = 0.0, 0.0
-    for axis in range(2):
-        at = dx * cosine + dy * sine if axis == 0 else dy * cosine - dx * sine
-        half = 0.5 * (length * c + width * s) if axis == 0 else 0.5 * (length * s + width * c)
-        column = LENGTH if axis == 0 else WIDTH
-        own = 0.5 * detections[a, k, column]
-        low = extent * min(at - half + own, 0.0) - own
-        high = extent * max(at + half - own, 0.0) + own
-        detections[a, k, column] = high - low
-        middle = 0.5 * (low + high)
-        shifts = (middle, 0.0) if axis == 0 else (shifts[0], middle)
-    detections[a, k, X] += shifts[0] * cosine - shifts[1] * sine
-    detections[a, k, Y] += shifts[0] * sine + shifts[1] * cosine
+    long, wide = 0.5 * detections[b, k, LENGTH], 0.5 * detections[b, k, WIDTH]
+    own = 0.5 * detections[a, k, LENGTH], 0.5 * detections[a, k, WIDTH]
+    at = dx * cosine + dy * sine, dy * cosine - dx * sine
+    detections[a, k, LENGTH], along = grow(own[0], at[0], long * c + wide * s, extent)
+    detections[a, k, WIDTH], across = grow(own[1], at[1], long * s + wide * c, extent)
+    detections[a, k, X] += along * cosine - across * sine
+    detections[a, k, Y] += along * sine + across * cosine
 
 
 @kernel
 def merge(tracker, bodies, memory, detections, k):
-    """Give bodies that are not resolved one detection, and mark the others as missed.
+    """Let unresolved bodies lead others: give leaders' detections of instant k their boxes.
 
-    Args:
-        tracker: see ``_tracking_kernels.settings``.
-        bodies: ``(E, 8)``.
-        memory: ``(E, MEMORY)``; the geometry is this frame's.
-        detections: ``(E, T, DETECTION)``, of instant k, in the world.
-        k: the instant.
+    ``memory[e, INTO]`` becomes the body that body e is one with, 0 where it has its own detection.
     """
     for e in range(1, memory.shape[0]):
         before, memory[e, INTO] = memory[e, INTO], 0.0
@@ -113,8 +103,3 @@ def merge(tracker, bodies, memory, detections, k):
             root = int(memory[root, INTO])
         if root != e:
             enclose(detections, k, root, e, tracker[EXTENT])
-    for e in range(1, memory.shape[0]):
-        if memory[e, INTO] > 0.0:
-            detections[e, k, SEEN_BY] = MISSED
-            for i in range(1, detections.shape[2]):
-                detections[e, k, i] = 0.0

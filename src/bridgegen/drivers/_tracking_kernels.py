@@ -1,9 +1,8 @@
 """From detections to tracks: what the planner knows of other participants.
 
-A track is a row of ``tracks`` ``(E, TRACK)``; row e is entity e, or what is not resolved from it
-(``_resolution_kernels``). Per axis of the world a Kalman filter estimates position and velocity; a
-track is tentative until enough of its last frames have seen it, coasts at its velocity when they
-miss it, and is then dropped.
+A track is a row of ``tracks`` ``(E, TRACK)``; row e is entity e, or the greater of several. Per
+axis of the world a Kalman filter estimates position and velocity; a track is tentative until enough
+of its last frames have seen it, coasts at its velocity when they miss it, and is then dropped.
 """
 
 # mypy: allow-untyped-defs
@@ -95,12 +94,6 @@ def begin(tracks, memory, e, x, y, h, length, width, kind, confidence, var_x, va
 
 
 @kernel
-def last(tracker):
-    """Return the bits of the frames that count for confirmation."""
-    return (1 << int(tracker[OF])) - 1
-
-
-@kernel
 def seen_in(history):
     """Return in how many of the last frames it was seen."""
     count, bits = 0, int(history)
@@ -129,7 +122,7 @@ def see(tracks, memory, e, x, y, h, length, width, kind, confidence, var_x, var_
         tracks[e, KIND] = kind
     tracks[e, CONFIDENCE] += SMOOTHING * (confidence - tracks[e, CONFIDENCE])
     tracks[e, UNSEEN] = 0.0
-    memory[e, HISTORY] = float(int(memory[e, HISTORY]) << 1 & last(tracker) | 1)
+    memory[e, HISTORY] = float(int(memory[e, HISTORY]) << 1 & (1 << int(tracker[OF])) - 1 | 1)
     if tracks[e, STATE] != TENTATIVE or seen_in(memory[e, HISTORY]) >= tracker[CONFIRM]:
         tracks[e, STATE] = CONFIRMED
 
@@ -146,7 +139,7 @@ def miss(tracks, memory, e, tracker):
     """Update a track that a frame has missed."""
     if tracks[e, STATE] == NONE:
         return
-    memory[e, HISTORY] = float(int(memory[e, HISTORY]) << 1 & last(tracker))
+    memory[e, HISTORY] = float(int(memory[e, HISTORY]) << 1 & (1 << int(tracker[OF])) - 1)
     hopeless = seen_in(memory[e, HISTORY]) == 0
     if tracks[e, STATE] != TENTATIVE:
         tracks[e, STATE] = COASTING

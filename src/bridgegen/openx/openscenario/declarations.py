@@ -75,8 +75,7 @@ GHOST = "ghost"
 """Property of a controller, ``ghost.NAME.KEY``: what its sensors report and is not there."""
 
 TRACKER = "tracker"
-"""Property of a controller, ``tracker.KEY``: what its tracker does not resolve, and how late its
-tracks are."""
+"""Property of a controller, ``tracker.KEY``: what is not resolved, and how late tracks are."""
 
 
 @dataclass(frozen=True)

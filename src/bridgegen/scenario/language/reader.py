@@ -475,9 +475,7 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     # A wrong word is reported with the shape.
     others = said_of_others if said_of_others in DRIVERS else SCRIPTED
     participants = driven((*board.participants, *changes.participants), board.events, others)
-    story = Story(
-        participants, board.events, changes.jams, changes.works, board.ghosts, board.tracker
-    )
+    story = Story(participants, board.events, changes.jams, changes.works, *board.perception)
     objective = _objective(document.data.get("objective", "harm"), quantities)
     criteria, wrong = read_criteria_in(document)
     problems += wrong + unknown_entities(

@@ -304,8 +304,10 @@ class LogicalScenario(SearchedScenario):
             models,
             ways,
             self.story.ghosts,
-            [ghost.mirrors for ghost in self.story.ghosts if ghost.mirrors],
-            self.story.tracker,
+            (
+                *(one.mirrors for one in self.story.ghosts if one.mirrors),
+                *self.story.tracker.items(),
+            ),
             changes,
             self.criteria,
             self.clauses,

@@ -404,9 +404,6 @@ TRACKER_UNITS = {
 }  # fmt: skip
 """The numbers of the ego's tracker, with their units; see ``TrackerSection``."""
 
-MOST_FRAMES = 30
-"""Number of frames of a track's history at most."""
-
 
 @dataclass(frozen=True)
 class Ghost:

@@ -290,8 +290,7 @@ class GhostSection(ShapedSection):
     mirrors: Text | None = None
     """Participant whose mirror image it is instead of a place."""
     aside: Length | None = None
-    """Where the mirror is: distance of the guard rail or wall from the ego's route to its left [m];
-    negative to its right."""
+    """Distance of the guard rail or wall, the mirror, to the left of the ego's route [m]."""
     share: Ratio | None = None
     """Share of frames in which it is reported [1], else all of them."""
     appears: Length

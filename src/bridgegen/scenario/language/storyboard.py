@@ -20,7 +20,6 @@ from bridgegen.scenario.language.schema_types import Formula, ShapedSection, Tex
 from bridgegen.scenario.language.story import (
     CONDITIONS,
     GHOST_UNITS,
-    MOST_FRAMES,
     TRACKER_UNITS,
     Action,
     Arrival,
@@ -78,8 +77,7 @@ class Storyboard:
     Attributes:
         participants: as ``LogicalScenario`` holds them.
         events: likewise.
-        ghosts: likewise.
-        tracker: likewise, its numbers.
+        perception: likewise, ghosts and the numbers of the tracker.
         known: the participants' names, also of those that are described wrongly.
         derived: the weathers between, where one changes over a time.
 
@@ -108,8 +106,7 @@ class Storyboard:
         self.participants = tuple(self._participants())
         self._acting = {participant.name: participant for participant in self.participants}
         self.events = tuple(self._events())
-        self.ghosts = tuple(self._ghosts())
-        self.tracker = self._tracker()
+        self.perception = tuple(self._ghosts()), self._tracker()
 
     # -- participants --------------------------------------------------------------------------
 
@@ -278,16 +275,13 @@ class Storyboard:
                 continue
             if not name.isidentifier() or not name.isascii():
                 self._report(f"a ghost's name is a word, got '{name}'", path)
-            if sum(item is not None for item in (given.at, given.rate, given.mirrors)) != 1:
-                self._report(
-                    f"ghost {name} must have a place (at), a rate, or mirrors: one of them", path
-                )
-            elif (given.mirrors is None) != (given.aside is None):
-                self._report(f"ghost {name} must have mirrors and aside, or neither", path)
+            stated = [given.at, given.rate, given.mirrors].count(None) == 2
+            if not stated or (given.mirrors is None) != (given.aside is None):
+                what = "a place (at), a rate, or mirrors with aside"
+                self._report(f"ghost {name} must have {what}, one of the three", path)
             if given.mirrors == EGO or given.mirrors not in (None, *self.known):
-                self._report(
-                    f"{name}.mirrors must name another participant, got '{given.mirrors}'", path
-                )
+                what = f"ghosts.{name}.mirrors must name another participant"
+                self._report(f"{what}, got '{given.mirrors}'", path)
             numbers = {w: value for w in GHOST_UNITS if (value := getattr(given, w)) is not None}
             for word, value in numbers.items():
                 above = word in ("rate", "appears", "lifetime", "share")
@@ -306,14 +300,14 @@ class Storyboard:
         for word, value in numbers.items():
             low = 1.0 if word in ("confirm", "of") else 0.0
             self._check(value, TRACKER_UNITS[word], ("tracker", word), low=low)
-        for word, limit in (("extent", 1.0), ("of", MOST_FRAMES)):
+        for word, limit in (("extent", 1.0), ("of", 30.0)):  # frames of `_tracking_kernels`
             highest = self._places.range_of(numbers[word])[1]
             if limit < highest < math.inf:
                 what = f"tracker.{word} [1] must be at most {limit:g}, got {highest:g}"
                 self._report(what, ("tracker", word))
-        least, most = given.confirm, given.of
-        if not isinstance(least, str) and not isinstance(most, str) and least > most:
-            self._report(f"confirm <= of must hold, got {least:g} and {most:g}", ("tracker",))
+        if self._places.range_of(given.confirm)[0] > self._places.range_of(given.of)[1]:
+            what = f"confirm <= of must hold, got {given.confirm} and {given.of}"
+            self._report(what, ("tracker",))
         if (given.angle == 0.0) != (given.range == 0.0):
             self._report("tracker must have angle and range, or neither", ("tracker",))
         return numbers

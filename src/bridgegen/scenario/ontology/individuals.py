@@ -171,7 +171,7 @@ def build(
     put(top, "has_road_network", add_road_network(builder, place))
     for participant in story.participants:
         put(top, "has_participant", add_participant(builder, participant, place, driver, ideal))
-    add_perception(builder, story.ghosts, story.tracker)
+    add_perception(builder, story)
     if odd:
         put(builder.iri(EGO), "has_odd", odd)
     for event in story.events:

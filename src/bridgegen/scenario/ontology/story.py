@@ -7,14 +7,12 @@ import pyoxigraph as ox
 
 from bridgegen.base.errors import OntologyError
 from bridgegen.scenario.language.adversary import LOOKING
-from bridgegen.scenario.language.roads import Quantity
 from bridgegen.scenario.language.story import (
     Action,
     Arrival,
     Change,
     ConditionSpec,
     EventSpec,
-    Ghost,
     Indication,
     Jam,
     KeepDistance,
@@ -23,6 +21,7 @@ from bridgegen.scenario.language.story import (
     Participant,
     RoadWorks,
     SpeedChange,
+    Story,
     Waypoint,
     WeatherChange,
 )
@@ -125,14 +124,12 @@ def add_participant(
     return node
 
 
-def add_perception(
-    builder: Builder, ghosts: Iterable[Ghost], tracker: Mapping[str, Quantity]
-) -> None:
+def add_perception(builder: Builder, story: Story) -> None:
     """Add the false positives of the ego's sensors and its tracker, which its controller has."""
     controller = builder.iri(f"{EGO}_controller")
-    for name, value in tracker.items():
+    for name, value in story.tracker.items():
         builder.quantity(controller, f"has_tracker_{name}", value)
-    for ghost in ghosts:
+    for ghost in story.ghosts:
         node = builder.node(ghost.name, "Ghost")
         builder.put(node, "has_name", ghost.name)
         builder.put(node, "has_ghost_type", ghost.type)

@@ -1,7 +1,7 @@
 """OWL2OpenSCENARIO, its entities: bodies and drivers."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -138,23 +138,20 @@ def _controller(
     said = [osc.Property(DRIVER, driver), osc.Property("esminiController", _ESMINI_CONTROLLER)]
     if individuals.optional_text(node, "has_ideal_stages") is not None:
         said.append(osc.Property(IDEAL, plain_text(individuals, node, "has_ideal_stages")))
-
-    def state(subject: Subject, prefix: str, key: str, words: Iterable[str]) -> None:
+    for part in (*individuals.links(node, "has_ghost"), node):
+        prefix, key, words = "has_tracker", TRACKER, TRACKER_UNITS
+        if part != node:
+            prefix, words = "has_ghost", GHOST_UNITS
+            key = f"{GHOST}.{plain_text(individuals, part, 'has_name')}"
+            for word in ("type", "mirrors"):
+                if individuals.optional_text(part, f"has_ghost_{word}") is not None:
+                    text = plain_text(individuals, part, f"has_ghost_{word}")
+                    said.append(osc.Property(f"{key}.{word}", text))
         for word in words:
-            if individuals.optional_number(subject, f"{prefix}_{word}") is not None:
-                value = quantities.get(subject, f"{prefix}_{word}")
-                text = format_double(value) if isinstance(value, float) else value
-                said.append(osc.Property(f"{key}.{word}", text))
-
-    for ghost in individuals.links(node, "has_ghost"):
-        key = f"{GHOST}.{plain_text(individuals, ghost, 'has_name')}"
-        kind = plain_text(individuals, ghost, "has_ghost_type")
-        said.append(osc.Property(f"{key}.type", kind))
-        if individuals.optional_text(ghost, "has_ghost_mirrors") is not None:
-            whose = plain_text(individuals, ghost, "has_ghost_mirrors")
-            said.append(osc.Property(f"{key}.mirrors", whose))
-        state(ghost, "has_ghost", key, GHOST_UNITS)
-    state(node, "has_tracker", TRACKER, TRACKER_UNITS)
+            if individuals.optional_number(part, f"{prefix}_{word}") is not None:
+                value = quantities.get(part, f"{prefix}_{word}")
+                shown = format_double(value) if isinstance(value, float) else value
+                said.append(osc.Property(f"{key}.{word}", shown))
     properties = osc.Properties(tuple(said))
     name = plain_text(individuals, node, "has_name")
     return osc.ObjectController(osc.Controller(name, properties))

@@ -275,8 +275,7 @@ class _Compiler:
         first_time = -1 if time is None else self.tables.slot(time[0])
         waits = (table(self.triggers.probes, 11)[:, PROBE] == END_OF_ROAD).any()
         leaves = len(objects) > 1 and not waits and not declared.stands(self.scenario, self.place)
-        # before the slots are read
-        ghosts = declared.ghosts(self.controllers, self.tables)
+        ghosts = declared.ghosts(self.controllers, self.tables)  # before the slots are read
         tracker = declared.tracker(self.controllers, self.tables)
         moves = declared.vehicle(self.controllers, self.place, vehicle, has_driver=has_driver)
         return Program(

@@ -230,9 +230,8 @@ def ghosts(controllers: Controllers, tables: Tables) -> Int:
         if said_type not in PARTICIPANTS:
             known = ", ".join(PARTICIPANTS)
             raise InputError(f"{where}.type must be one of {known}, got '{said_type}'")
-        slots = {"vanishes": tables.slot(0.0), "lifetime": tables.slot(60.0)}
-        if "share" not in words:
-            slots["share"] = tables.slot(1.0)
+        usual = {"vanishes": 0.0, "lifetime": 60.0, "share": 1.0}
+        slots = {word: tables.slot(value) for word, value in usual.items()}
         for word, unit in GHOST_UNITS.items():
             if word in words:
                 low = -math.inf if word == "aside" else 0.0
@@ -246,11 +245,7 @@ def ghosts(controllers: Controllers, tables: Tables) -> Int:
 
 
 def tracker(controllers: Controllers, tables: Tables) -> Int:
-    """Return `Program.tracker`, which the ego's controllers name.
-
-    Raises:
-        InputError: a key that no tracker has, or a value that none may have.
-    """
+    """Return `Program.tracker`; raise `InputError` as `ghosts` does."""
     found: dict[str, int] = {}
     for controller in controllers.of(0):
         for item in controller.properties.properties if controller.properties else ():
@@ -264,16 +259,12 @@ def tracker(controllers: Controllers, tables: Tables) -> Int:
             high = {"extent": 1.0, "of": float(tracking.MOST_FRAMES)}.get(word, math.inf)
             found[word] = _slot(tables, item.value, f"{where} [{TRACKER_UNITS[word]}]", low, high)
     usual = zip(TRACKER_UNITS, tracking.TRACKER, strict=True) if found else ()
-    slots = [found[word] if word in found else tables.slot(value) for word, value in usual]
+    slots = [found.get(word, tables.slot(value)) for word, value in usual]
     return np.array(slots, dtype=np.int64)
 
 
 def _slot(tables: Tables, text: Any, what: str, low: float, high: float = math.inf) -> int:
-    """Return the slot of a property's value, a number or a parameter.
-
-    Raises:
-        InputError: it is neither, or not from ``low`` to ``high``.
-    """
+    """Return the slot of a property's value, a number or a parameter, from ``low`` to ``high``."""
     varies = isinstance(text, osc.ParameterRef) and text.name in tables.parameters
     value: Value | None = text if varies else _number(tables.text(text))
     number = math.nan if value is None else tables.declared(value)
