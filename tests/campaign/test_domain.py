@@ -73,19 +73,24 @@ def test_a_driver_outside_its_domain_is_named(scenario, ego, said):
 
 
 @pytest.mark.parametrize(
-    ("ego", "ideal", "sees_the_truth"),
+    ("scenario", "ego", "ideal", "sees_the_truth"),
     [
-        ("route-follower", (), True),
-        ("careful", (), True),
-        ("reference", ("perception",), True),
-        ("reference", (), False),
+        ("phantom-braking", "route-follower", (), True),
+        ("phantom-braking", "careful", (), True),
+        ("phantom-braking", "reference", ("perception",), True),
+        ("phantom-braking", "reference", (), False),
+        ("unresolved-pedestrian", "careful", (), True),
+        ("unresolved-pedestrian", "reference", (), False),
     ],
 )
-def test_who_meets_no_ghosts_is_not_said_to_pass_them(tmp_path, ego, ideal, sees_the_truth):
+def test_who_meets_no_errors_of_perception_is_not_said_to_pass_them(
+    tmp_path, scenario, ego, ideal, sees_the_truth
+):
     run = bg.run_search(
-        "phantom-braking", ego=ego, ideal=ideal, algorithm="random", budget=20, keep=0,
+        scenario, ego=ego, ideal=ideal, algorithm="random", budget=20, keep=0,
         triage="none", out=tmp_path / "run",
     )  # fmt: skip
     assert (run.verdict == "not judged") == sees_the_truth
-    said = "sees what is there, and so none of the ghosts of phantom-braking"
+    errors = "ghosts" if scenario == "phantom-braking" else "late and merged tracks"
+    said = f"sees what is there, and so none of the {errors} of {scenario}"
     assert (said in (run.folder / "report.html").read_text("utf-8")) == sees_the_truth

@@ -7,7 +7,7 @@ import numpy as np
 from bridgegen.drivers import _weather_columns as column
 from bridgegen.drivers import _weather_kernels
 from bridgegen.drivers._perception_kernels import MEMORY, perceive
-from bridgegen.drivers._tracking_kernels import TRACK
+from bridgegen.drivers._tracking_kernels import TRACK, TRACKER
 from bridgegen.drivers.kinds import CAR, DETECTION, PEDESTRIAN
 
 BOX = {
@@ -44,7 +44,9 @@ class Scene:
         self.present = np.ones(e, dtype=np.bool_)
         self.lamps = np.zeros(e, dtype=np.int64)
 
-    def perceive(self, numbers: np.ndarray, key: int = 1, *, ideal: bool = False):
+    def perceive(
+        self, numbers: np.ndarray, key: int = 1, *, ideal: bool = False, tracker: tuple = TRACKER
+    ):
         """Return the detections ``(E, T, 8)`` and the tracks of all instants ``(T, E, 13)``."""
         memory = np.zeros((self.n_entities, MEMORY))
         tracks = np.zeros((self.n_entities, TRACK))
@@ -53,7 +55,8 @@ class Scene:
         for k in range(self.n_steps):
             perceive(
                 k, self.dt, np.uint64(key), ideal, self.present, self.x, self.y, self.h, self.v,
-                self.bodies, self.kinds, self.lamps, numbers, memory, tracks, detections,
+                self.bodies, self.kinds, self.lamps, numbers, tracker, memory, tracks,
+                detections,
             )  # fmt: skip
             history[k] = tracks
         return detections, history

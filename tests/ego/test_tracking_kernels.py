@@ -12,7 +12,8 @@ DT = 0.1
 class Tracker:
     """One track, fed by hand."""
 
-    def __init__(self) -> None:
+    def __init__(self, settings: tuple = track.TRACKER) -> None:
+        self.settings = settings
         self.tracks = np.zeros((2, track.TRACK))
         self.memory = np.zeros((2, track.MEMORY))
 
@@ -24,11 +25,12 @@ class Tracker:
         """Pass 0.1 s and a frame: a detection at (x, y), or none; return the state then."""
         track.advance(self.tracks, self.memory, 1, DT)
         if x is None:
-            track.miss(self.tracks, self.memory, 1)
+            track.miss(self.tracks, self.memory, 1, self.settings)
         else:
             track.see(
-                self.tracks, self.memory, 1, x, y, h, 4.5, 1.8, kind, confidence, variance, variance
-            )
+                self.tracks, self.memory, 1, x, y, h, 4.5, 1.8, kind, confidence, variance,
+                variance, self.settings,
+            )  # fmt: skip
         return self.row[track.STATE]
 
 

@@ -32,7 +32,8 @@ from bridgegen.drivers._physics_kernels import (
     LEAST_HEIGHT,
     MOUNT,
 )
-from bridgegen.drivers._sensor_kernels import DRAWN, MEMORY, draw, observe
+from bridgegen.drivers._resolution_kernels import merge
+from bridgegen.drivers._sensor_kernels import DRAWN, INTO, MEMORY, VAR_X, VAR_Y, draw, observe
 from bridgegen.drivers.kinds import (
     BOTH,
     CONFIDENCE,
@@ -134,15 +135,12 @@ def know(k, dt, present, x, y, h, v, bodies, kinds, lamps, tracks, detections):
 
 
 @kernel
-def look(
-    k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, memory, tracks, detections
-):
+def look(k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, tracker, memory,
+         tracks, detections):  # fmt: skip
     """Take a sensor frame: fill its detections, and update the tracks."""
     elapsed = max(dt, FRAME)
-    renew, keep = (
-        1.0 - elementary.exp(-elapsed / DROPOUT_TIME),
-        elementary.exp(-elapsed / ERROR_TIME),
-    )
+    renew = 1.0 - elementary.exp(-elapsed / DROPOUT_TIME)
+    keep = elementary.exp(-elapsed / ERROR_TIME)
     near = place(k, present, x, y, h, bodies, memory)
     heading = elementary.cos(h[0, k]), elementary.sin(h[0, k])
     height = max(MOUNT * bodies[0, 7], LEAST_HEIGHT)
@@ -152,7 +150,6 @@ def look(
         blank(detections, e, k, MISSED)
         if memory[e, D] == math.inf:
             memory[e, DRAWN] = 0.0
-            tracking.miss(tracks, memory, e)
             continue
         # Whether it is seen or not: the same key then draws the same numbers in any weather, and a
         # counterfactual compares like with like.
@@ -162,34 +159,34 @@ def look(
             memory, e, bodies, kinds[e], weather, heading, height, share, detections, k
         )
         if detections[e, k, SEEN_BY] == MISSED:
-            tracking.miss(tracks, memory, e)
             continue
         detections[e, k, X] += sx
         detections[e, k, Y] += sy
         detections[e, k, HEADING] += h[e, k]
         ux, uy = memory[e, DX] / memory[e, D], memory[e, DY] / memory[e, D]
         along, across = COLOURED * along, COLOURED * across
-        tracking.see(
-            tracks,
-            memory,
-            e,
-            detections[e, k, X],
-            detections[e, k, Y],
-            detections[e, k, HEADING],
-            detections[e, k, LENGTH],
-            detections[e, k, WIDTH],
-            detections[e, k, KIND],
-            detections[e, k, CONFIDENCE],
-            along * ux * ux + across * uy * uy,
-            along * uy * uy + across * ux * ux,
-        )
+        memory[e, VAR_X] = along * ux * ux + across * uy * uy
+        memory[e, VAR_Y] = along * uy * uy + across * ux * ux
+    if tracker[tracking.ANGLE] > 0.0 and near > 1:
+        merge(tracker, bodies, memory, detections, k)
+    for e in range(1, x.shape[0]):
+        if memory[e, INTO] > 0.0:
+            blank(detections, e, k, MISSED)
+        if detections[e, k, SEEN_BY] == MISSED:
+            tracking.miss(tracks, memory, e, tracker)
+            continue
+        px, py, turn = detections[e, k, X], detections[e, k, Y], detections[e, k, HEADING]
+        length, width = detections[e, k, LENGTH], detections[e, k, WIDTH]
+        kind, sure = detections[e, k, KIND], detections[e, k, CONFIDENCE]
+        vx, vy = memory[e, VAR_X], memory[e, VAR_Y]
+        tracking.see(tracks, memory, e, px, py, turn, length, width, kind, sure, vx, vy, tracker)
         tracks[e, tracking.LAMPS] = lamps[e]
 
 
 @kernel
 def perceive(
-    k, dt, key, ideal, present, x, y, h, v, bodies, kinds, lamps, weather, memory, tracks,
-    detections,
+    k, dt, key, ideal, present, x, y, h, v, bodies, kinds, lamps, weather, tracker, memory,
+    tracks, detections,
 ):  # fmt: skip
     """Bring the tracks up to instant k, with a sensor frame if one is due.
 
@@ -210,6 +207,7 @@ def perceive(
         kinds: ``(E,)``, see `bridgegen.drivers.kinds`.
         lamps: ``(E,)`` int64, what shows, see `bridgegen.drivers.kinds`.
         weather: ``(W,)``, see ``_weather_kernels``.
+        tracker: see ``_tracking_kernels.settings``.
         memory: ``(E, MEMORY)``, zeros before the first instant.
         tracks: ``(E, TRACK)``, zeros before the first instant; see ``_tracking_kernels``.
         detections: ``(E, T, DETECTION)``, of which instant k is written.
@@ -224,8 +222,8 @@ def perceive(
     frame = frame_at(k, dt)
     if frame >= 0:
         look(
-            k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, memory, tracks,
-            detections,
+            k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, tracker, memory,
+            tracks, detections,
         )  # fmt: skip
         return
     for e in range(1, x.shape[0]):

@@ -44,6 +44,7 @@ from bridgegen.drivers._speed_kernels import (
     sight_speed,
 )
 from bridgegen.drivers._surroundings_kernels import BEHIND, NEAR, surround
+from bridgegen.drivers._tracking_kernels import settings
 from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.drivers._yielding_kernels import yield_to_all
 
@@ -163,8 +164,8 @@ def drive(k, plan_, roads, state, record):
     curvature = keep_to_route(k, roads, state, record)
     perceive(
         k, plan_.dt, state.key[0], plan_.ideal_perception, state.visible, record.x, record.y,
-        record.h, record.v, plan_.bodies, plan_.kinds, state.lamps, state.weather, state.sensors,
-        state.tracks, record.detections,
+        record.h, record.v, plan_.bodies, plan_.kinds, state.lamps, state.weather,
+        settings(plan_.tracker, state.slots), state.sensors, state.tracks, record.detections,
     )  # fmt: skip
     haunt(k, plan_, roads, state, record)
     # By time, not by instants: so it plans as often at any step up to `CYCLE`.

@@ -46,11 +46,12 @@ from bridgegen.drivers.kinds import (
 
 # Columns of ``memory`` ``(E, MEMORY)`` after the tracker's and the geometry's: 0 until the body's
 # random numbers have been drawn; the three persistent uniform numbers; the six errors in standard
-# deviations.
+# deviations; the variances [m²] of this frame's position; the body that it is not resolved from.
 DRAWN = LAST
 BY_CAMERA, BY_LIDAR, BY_CLASS = DRAWN + 1, DRAWN + 2, DRAWN + 3
 CAMERA_ALONG, CAMERA_ACROSS, LIDAR_ALONG, LIDAR_ACROSS, SIZE, TURN = range(DRAWN + 4, DRAWN + 10)
-MEMORY = DRAWN + 10
+VAR_X, VAR_Y, INTO = DRAWN + 10, DRAWN + 11, DRAWN + 12
+MEMORY = DRAWN + 13
 
 # Streams of random numbers.
 DROPOUTS, ERRORS, OTHERS = 0, 1, 2

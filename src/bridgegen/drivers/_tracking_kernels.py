@@ -1,6 +1,6 @@
 """From detections to tracks: what the planner knows of other participants.
 
-A track is a row of ``tracks`` ``(E, TRACK)``; row e is entity e, since association is perfect. Per
+A track is a row of ``tracks`` ``(E, TRACK)``; row e is entity e, or the greater of several. Per
 axis of the world a Kalman filter estimates position and velocity; a track is tentative until enough
 of its last frames have seen it, coasts at its velocity when they miss it, and is then dropped.
 """
@@ -22,11 +22,30 @@ NONE, TENTATIVE, CONFIRMED, COASTING = 0, 1, 2, 3
 HISTORY, PX, PY = 0, 1, 4
 MEMORY = 7
 
-CONFIRM, OF = 3, 5  # frames: seen in 3 of the last 5; Blackman, Popoli, Modern Tracking Systems
-COAST = 1.0  # s, how long a confirmed track lives unseen
+ANGLE, RANGE, EXTENT, CONFIRM, OF, COAST = range(6)
+"""Columns of ``Plan.tracker`` ``(6,)``, slots of what the scenario states, and items of what
+`settings` returns: gaps in bearing [rad; the slot's in degrees] and range [m] up to which two
+bodies are one; how far its box grows to enclose both, 0 to 1; in how many of the last frames a
+track must be seen to be confirmed, and of how many; how long it lives unseen [s]."""
+
+TRACKER = (0.0, 0.0, 1.0, 3.0, 5.0, 1.0)
+"""What holds unless a scenario states otherwise: all is resolved, 3 of 5 frames confirm, 1 s.
+Source of M of N: S. Blackman, R. Popoli, Design and Analysis of Modern Tracking Systems (1999)."""
+
+MOST_FRAMES = 30  # that a track's history holds
 MANOEUVRE = 4.0  # m²/s³, of white-noise acceleration: ±2 m/s unforeseen in a second
 FASTEST = 15.0  # m/s, standard deviation of the velocity of what has just been seen
 SMOOTHING = 0.3  # of heading, box and confidence, per frame
+
+
+@kernel
+def settings(tracker, slots):
+    """Return what the scenario states of the tracker, else `TRACKER`; the angle in radians."""
+    if len(tracker) == 0:
+        return TRACKER
+    angle, extent = math.radians(slots[tracker[ANGLE]]), slots[tracker[EXTENT]]
+    frames, coast = min(slots[tracker[OF]], float(MOST_FRAMES)), slots[tracker[COAST]]
+    return angle, slots[tracker[RANGE]], extent, slots[tracker[CONFIRM]], frames, coast
 
 
 @kernel
@@ -78,17 +97,19 @@ def begin(tracks, memory, e, x, y, h, length, width, kind, confidence, var_x, va
 def seen_in(history):
     """Return in how many of the last frames it was seen."""
     count, bits = 0, int(history)
-    for _ in range(OF):
+    while bits > 0:
         count += bits & 1
         bits >>= 1
     return count
 
 
 @kernel
-def see(tracks, memory, e, x, y, h, length, width, kind, confidence, var_x, var_y):
+def see(tracks, memory, e, x, y, h, length, width, kind, confidence, var_x, var_y, tracker):
     """Take a detection into a track: of a box's centre with variances [m²], at this instant."""
     if tracks[e, STATE] == NONE:
         begin(tracks, memory, e, x, y, h, length, width, kind, confidence, var_x, var_y)
+        if tracker[CONFIRM] <= 1.0:
+            tracks[e, STATE] = CONFIRMED
         return
     correct(tracks, memory, e, X, VX, PX, x, var_x)
     correct(tracks, memory, e, Y, VY, PY, y, var_y)
@@ -101,8 +122,8 @@ def see(tracks, memory, e, x, y, h, length, width, kind, confidence, var_x, var_
         tracks[e, KIND] = kind
     tracks[e, CONFIDENCE] += SMOOTHING * (confidence - tracks[e, CONFIDENCE])
     tracks[e, UNSEEN] = 0.0
-    memory[e, HISTORY] = float((int(memory[e, HISTORY]) << 1 | 1) & (2**OF - 1))
-    if tracks[e, STATE] != TENTATIVE or seen_in(memory[e, HISTORY]) >= CONFIRM:
+    memory[e, HISTORY] = float(int(memory[e, HISTORY]) << 1 & (1 << int(tracker[OF])) - 1 | 1)
+    if tracks[e, STATE] != TENTATIVE or seen_in(memory[e, HISTORY]) >= tracker[CONFIRM]:
         tracks[e, STATE] = CONFIRMED
 
 
@@ -114,14 +135,14 @@ def forget(tracks, e):
 
 
 @kernel
-def miss(tracks, memory, e):
+def miss(tracks, memory, e, tracker):
     """Update a track that a frame has missed."""
     if tracks[e, STATE] == NONE:
         return
-    memory[e, HISTORY] = float((int(memory[e, HISTORY]) << 1) & (2**OF - 1))
+    memory[e, HISTORY] = float(int(memory[e, HISTORY]) << 1 & (1 << int(tracker[OF])) - 1)
     hopeless = seen_in(memory[e, HISTORY]) == 0
     if tracks[e, STATE] != TENTATIVE:
         tracks[e, STATE] = COASTING
-        hopeless = tracks[e, UNSEEN] > COAST
+        hopeless = tracks[e, UNSEEN] > tracker[COAST]
     if hopeless:
         forget(tracks, e)

@@ -48,7 +48,7 @@ m/s², always above 1.3 m/s²."""
 
 
 # --- The columns of ``Rollout.detections``: how the ego's sensors detect an entity at an instant --
-# Association is perfect: a detection is in the row of the entity that caused it.
+# A detection is in the row of the entity that caused it, or of the greater of those it is of.
 
 
 SEEN_BY = 0

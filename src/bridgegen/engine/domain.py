@@ -32,7 +32,7 @@ VULNERABLE = frozenset({"pedestrian", "bicycle"})
 def outside(runner: "Runner") -> str:
     """Return a sentence if the scenario says nothing of the ego's driver, which passes it; else "".
 
-    The driver says that it is not made for the scenario, or it meets none of its ghosts. A driver
+    The driver says that it is not made for it, or has none of its errors of perception. A driver
     for motorways may also follow a road on which there are lanes, but at first nobody, the other
     way.
     """
@@ -43,11 +43,13 @@ def outside(runner: "Runner") -> str:
 
 
 def unhaunted(driver: Driver, name: str, program: Program) -> str:
-    """Return a sentence if a scenario has ghosts and the ego's driver sees none; else ""."""
+    """Return a sentence if a scenario has errors of perception that its driver lacks; else ""."""
     perceives = driver.perceives and "perception" not in driver.ideal
-    if driver == STORYBOARD or perceives or not len(program.ghosts):
+    stated = {"ghosts": program.ghosts, "late and merged tracks": program.tracker}
+    errors = " and ".join(what for what, table in stated.items() if len(table))
+    if driver == STORYBOARD or perceives or not errors:
         return ""
-    return f"{driver.label} sees what is there, and so none of the ghosts of {name}"
+    return f"{driver.label} sees what is there, and so none of the {errors} of {name}"
 
 
 def why_outside(driver: Driver, name: str, needs: frozenset[str], is_met: bool) -> str:

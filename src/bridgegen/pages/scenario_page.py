@@ -31,6 +31,7 @@ from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.story import (
     CONDITIONS,
     GHOST_UNITS,
+    TRACKER_UNITS,
     ConditionSpec,
     EventSpec,
     Ghost,
@@ -63,12 +64,16 @@ def _lines(scenario: LogicalScenario) -> Iterator[str]:
     yield from (_jam(jam, scenario) for jam in scenario.story.jams)
     yield from (_works(works, scenario) for works in scenario.story.works)
     yield from (_ghost(ghost) for ghost in scenario.story.ghosts)
+    if tracker := scenario.story.tracker:
+        said = (f"{name} {in_words(value, TRACKER_UNITS[name])}" for name, value in tracker.items())
+        yield f"The ego's tracks are late, and merge: {', '.join(said)}."
     yield from (_event(event) for event in scenario.events)
 
 
 def _ghost(ghost: Ghost) -> str:
     said = (f"{name} {in_words(value, GHOST_UNITS[name])}" for name, value in ghost.numbers.items())
-    what = f"the ego's sensors report a {ghost.type} where nothing is"
+    where = f"as a mirror image of {ghost.mirrors}" if ghost.mirrors else "where nothing is"
+    what = f"the ego's sensors report a {ghost.type} {where}"
     return f"{ghost.name}: {what} ({', '.join(said)})."
 
 

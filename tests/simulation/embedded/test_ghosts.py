@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tests.approval import approve, refuses
 
-from bridgegen.base.errors import InputError, ScenarioError
-from bridgegen.drivers.kinds import GHOST, MISSED, NO_FRAME, SEEN_BY, X
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.kinds import GHOST, HEADING, MISSED, NO_FRAME, SEEN_BY, X, Y
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
@@ -26,13 +26,24 @@ AT_RANDOM = f"""{GHOSTS.rstrip()}
   clutter: {{type: car, rate: 20 1/km, appears: 60.0, vanishes: 10.0, lifetime: 0.5}}
 
 """
+IMAGE = f"""{GHOSTS.rstrip()}
+  image: {{type: car, mirrors: rear, aside: -2.5, share: 0.5, appears: 140.0, vanishes: 1.0}}
+
+"""
+TRACKER = GHOSTS + (
+    "tracker: {angle: 2.0, range: 1.5, extent: 0.5, confirm: 2, of: 4, coast: 0.5}\n\n"
+)
 
 
 @pytest.fixture
 def made(tmp_path):
     def make(ghosts: str = GHOSTS, **options) -> Pipeline:
         path = tmp_path / "phantom-braking.yaml"
-        path.write_text(TEXT.replace(GHOSTS, ghosts), "utf-8")
+        text = TEXT.replace(GHOSTS, ghosts)
+        if ghosts == IMAGE:  # of a car ahead, on the other lane
+            text = text.replace("lane: 2, distance: rear_at", "lane: 1, distance: rear_at")
+            text = text.replace("value: 120 - gap - 4.6", "value: 120 + gap + 4.6")
+        path.write_text(text, "utf-8")
         scenario = load(path)
         return Pipeline(scenario, scenario.space(), PipelineOptions(ego="reference", **options))
 
@@ -109,8 +120,25 @@ def test_births_follow_the_rate(made):
     assert frames.sum() / births == pytest.approx(0.5 / 0.1, rel=0.2)
 
 
-def test_files_say_it_there_and_back(made):
-    pipeline = made()
+def test_an_image_is_the_body_beyond_the_mirror(made):
+    """A rail 2.5 m right of the ego's way: what is 3.75 m left of it is seen 8.75 m right."""
+    pipeline = made(IMAGE)
+    rollout = pipeline.rollout(rows(pipeline, 64))
+    image, frames = rollout.ghosts[:, 1], rollout.ghosts[:, 1, :, SEEN_BY]
+    seen = frames == GHOST
+    ahead = rollout.x[:, 1] + rollout.box[1, 2]
+    way = rollout.y[:, 0, :1]
+    assert np.abs(image[..., X] - ahead)[seen].max() < 0.5
+    assert image[..., Y][seen].mean() == pytest.approx((way - 8.75).mean(), abs=0.02)
+    assert np.abs(image[..., Y] - way + 8.75)[seen].max() < 0.5
+    assert image[..., HEADING][seen].mean() == pytest.approx(0.0, abs=0.02)
+    near = (ahead - rollout.x[:, 0] < 120.0) & (frames != NO_FRAME)
+    assert (seen & near).sum() / near.sum() == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("said", [GHOSTS, IMAGE, TRACKER])
+def test_files_say_it_there_and_back(made, said):
+    pipeline = made(said)
     concrete = pipeline.runner.concrete(pipeline.space.row({}), "roads.xodr")
     assert not list(check(concrete.individuals, pipeline.runner.source.constraints))
     found, lost = individuals_from_openscenario(
@@ -120,8 +148,12 @@ def test_files_say_it_there_and_back(made):
     text = to_xml(concrete.storyboard)
     assert to_xml(openscenario_from_owl(found, "roads.xodr")) == text
     assert b"bridge" not in text.split(b"<Storyboard>")[1]  # no body of the scenario
-    assert pipeline.runner.embedded.program.names == ("ego", "rear")
-    approve(" ".join(story_lines(pipeline.scenario)), "bridge")
+    program = pipeline.runner.embedded.program
+    assert program.names == ("ego", "rear")
+    assert [program.slots[i] for i in program.tracker] == (
+        [2.0, 1.5, 0.5, 2.0, 4.0, 0.5] if said == TRACKER else []
+    )
+    approve(" ".join(story_lines(pipeline.scenario)))
 
 
 @pytest.mark.parametrize(
@@ -138,10 +170,16 @@ def test_files_say_it_there_and_back(made):
             "    appears: 10.0\n    vanishes: 20.0\n",
             ("vanishes < appears", "20"),
         ),
+        ("    at: bridge_at\n", "    mirrors: rear\n", ("bridge", "aside")),
+        ("    at: bridge_at\n", "    mirrors: nobody\n    aside: 2.5\n", ("nobody",)),
+        (GHOSTS, TRACKER.replace("of: 4", "of: 1"), ("confirm <= of", "2")),
+        (GHOSTS, TRACKER.replace("of: 4", "of: 40"), ("tracker.of", "40", "30")),
+        (GHOSTS, TRACKER.replace("range: 1.5, ", ""), ("angle", "range")),
+        (GHOSTS, TRACKER.replace("1.5", "-1.5"), ("tracker.range [m]", "-1.5")),
     ],
 )
 def test_a_scenario_file_that_says_it_wrongly_is_refused(made, old, new, named):
-    with refuses(ScenarioError, *named):
+    with refuses(InputError, *named):
         made(GHOSTS.replace(old, new))
 
 
@@ -153,6 +191,12 @@ def test_a_scenario_file_that_says_it_wrongly_is_refused(made, old, new, named):
         ('name="ghost.bridge.type" value="car"', 'name="ghost.bridge.type" value="x"', ("'x'",)),
         ('value="$vanishes"', 'value="-4"', ("ghost.bridge.vanishes [m]", "-4")),
         ('value="$vanishes"', 'value="soon"', ("ghost.bridge.vanishes [m]", "soon")),
+        ('"ghost.bridge.vanishes"', '"tracker.vanishes"', ("tracker.vanishes", "coast")),
+        (
+            'name="ghost.bridge.vanishes" value="$vanishes"',
+            'name="tracker.extent" value="1.5"',
+            ("tracker.extent [1]", "1.5"),
+        ),
     ],
 )
 def test_an_openscenario_file_that_says_it_wrongly_is_refused(made, old, new, named):

@@ -325,8 +325,9 @@ def _parts() -> Iterator[Check]:
         k += 1
     yield Check("traffic brakes after [s]", 0.75, k * DT)
     tracks, memory = np.zeros((2, 32)), np.zeros((2, 32))
+    box = 4.0, 2.0, 0, 1.0, 0.1, 0.1, _tracking_kernels.TRACKER
     for heading in (3.1, -3.1):
-        _tracking_kernels.see(tracks, memory, 1, 0.0, 0.0, heading, 4.0, 2.0, 0, 1.0, 0.1, 0.1)
+        _tracking_kernels.see(tracks, memory, 1, 0.0, 0.0, heading, *box)
     moved = tracks[1, _tracking_kernels.H] - 3.1
     least = 0.0 <= moved <= 2.0 * math.pi - 6.2
     yield Check("a heading turns the short way", True, bool(least))

@@ -74,6 +74,9 @@ it follows from the values of the file's parameters."""
 GHOST = "ghost"
 """Property of a controller, ``ghost.NAME.KEY``: what its sensors report and is not there."""
 
+TRACKER = "tracker"
+"""Property of a controller, ``tracker.KEY``: what is not resolved, and how late tracks are."""
+
 
 @dataclass(frozen=True)
 class Property(Element):

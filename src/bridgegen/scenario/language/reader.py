@@ -423,7 +423,7 @@ def _read_fragment(name: str, folder: Path | None) -> Document:
     return read_document(folder / name)
 
 
-_USING = ("roads", "participants", "events", "jams", "road_works", "ghosts")
+_USING = ("roads", "participants", "events", "jams", "road_works", "ghosts", "tracker")
 
 
 def _texts(data: object) -> set[str]:
@@ -475,7 +475,7 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     # A wrong word is reported with the shape.
     others = said_of_others if said_of_others in DRIVERS else SCRIPTED
     participants = driven((*board.participants, *changes.participants), board.events, others)
-    story = Story(participants, board.events, changes.jams, changes.works, board.ghosts)
+    story = Story(participants, board.events, changes.jams, changes.works, *board.perception)
     objective = _objective(document.data.get("objective", "harm"), quantities)
     criteria, wrong = read_criteria_in(document)
     problems += wrong + unknown_entities(

@@ -322,6 +322,10 @@ class LogicalScenario(SearchedScenario):
             models,
             ways,
             self.story.ghosts,
+            (
+                *(one.mirrors for one in self.story.ghosts if one.mirrors),
+                *self.story.tracker.items(),
+            ),
             changes,
             self.criteria,
             self.clauses,

@@ -42,6 +42,7 @@ from bridgegen.scenario.language.story_schema import (
     GhostSection,
     JamSection,
     ParticipantSection,
+    TrackerSection,
     WorksSection,
 )
 from bridgegen.scenario.language.storyboard import RecordedSection
@@ -296,6 +297,8 @@ class ScenarioFile(ShapedSection):
     """Lanes closed by cones, by name (layer 3)."""
     ghosts: dict[str, GhostSection] = {}
     """False positives of the ego's sensors by name: what they report and is not there."""
+    tracker: TrackerSection | None = None
+    """What the ego's sensors do not resolve, and how late its tracks are."""
     effects: list[EffectSection] = []
     """Functions of your own that add to each scenario."""
     parameters: dict[str, ParameterSection] = {}

@@ -16,7 +16,7 @@ STRIPS = ("sidewalk", "shoulder")
 
 def in_words(value: Quantity, unit: str) -> str:
     """Return a parameter's name as it is, a number with its unit."""
-    return value if isinstance(value, str) else f"{value:g} {unit}"
+    return value if isinstance(value, str) else f"{value:g} {unit}".removesuffix(" 1")
 
 
 def beside(offset: Quantity) -> str:
@@ -417,8 +417,16 @@ class RoadWorks:
     sign: Waypoint
 
 
-GHOST_UNITS = {"at": "m", "rate": "1/m", "appears": "m", "vanishes": "m", "lifetime": "s"}
+GHOST_UNITS = {
+    "at": "m", "rate": "1/m", "appears": "m", "vanishes": "m", "lifetime": "s", "aside": "m",
+    "share": "1",
+}  # fmt: skip
 """The numbers of a ghost, with their units; see ``GhostSection``."""
+
+TRACKER_UNITS = {
+    "angle": "deg", "range": "m", "extent": "1", "confirm": "1", "of": "1", "coast": "s",
+}  # fmt: skip
+"""The numbers of the ego's tracker, with their units; see ``TrackerSection``."""
 
 
 @dataclass(frozen=True)
@@ -428,12 +436,14 @@ class Ghost:
     Attributes:
         name: of it.
         type: what it is taken for, one of `bridgegen.scenario.participants.TYPES`.
-        numbers: those of `GHOST_UNITS` that it has, by name: either at or rate.
+        numbers: those of `GHOST_UNITS` that it has, by name: either at, or rate, or aside.
+        mirrors: name of the participant whose mirror image it is; empty: of none.
     """
 
     name: str
     type: str
     numbers: Mapping[str, Quantity]
+    mirrors: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True)
@@ -446,6 +456,7 @@ class Story:
         jams: queues; their vehicles are among the participants.
         works: closed lanes.
         ghosts: false positives of the ego's sensors.
+        tracker: the numbers of `TRACKER_UNITS`; empty if the scenario states none.
     """
 
     participants: tuple[Participant, ...] = ()
@@ -453,6 +464,7 @@ class Story:
     jams: tuple[Jam, ...] = field(default=())
     works: tuple[RoadWorks, ...] = field(default=())
     ghosts: tuple[Ghost, ...] = field(default=(), repr=False)
+    tracker: Mapping[str, Quantity] = field(default_factory=dict, repr=False)
 
     @property
     def later_weathers(self) -> tuple[str, ...]:

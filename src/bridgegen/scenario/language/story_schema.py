@@ -15,8 +15,10 @@ from bridgegen.scenario.language.schema_types import (
     MetresPerSecond,
     Number,
     QuantityField,
+    Ratio,
     ShapedSection,
     Speed,
+    Text,
     Word,
     convert,
 )
@@ -305,12 +307,35 @@ class GhostSection(ShapedSection):
     """Place along the ego's route at which it seems to stand, from the ego's start [m]."""
     rate: Curvature | None = None
     """Births per distance travelled instead of a place [1/m], at random in the region ahead."""
+    mirrors: Text | None = None
+    """Participant whose mirror image it is instead of a place."""
+    aside: Length | None = None
+    """Distance of the guard rail or wall, the mirror, to the left of the ego's route [m]."""
+    share: Ratio | None = None
+    """Share of frames in which it is reported [1], else all of them."""
     appears: Length
     """Largest distance ahead of the ego's front at which it is reported [m]."""
     vanishes: Length = 0.0
     """Distance ahead of the ego's front below which it is not reported any more [m]."""
     lifetime: Duration = 60.0
     """Longest time for which it is reported [s]; of births at random the mean."""
+
+
+class TrackerSection(ShapedSection):
+    """What the ego's sensors do not resolve, and how its tracker confirms and keeps a track."""
+
+    angle: Angle = 0.0
+    """Gap in bearing up to which two bodies are detected as one [deg]."""
+    range: Length = 0.0
+    """Gap in range up to which two bodies are detected as one [m]."""
+    extent: Ratio = 1.0
+    """Share by which the greater one's box grows to enclose both [1]; at 0 it masks the other."""
+    confirm: Ratio = 3.0
+    """Number of frames, of the last ``of``, that must see a track before it is confirmed."""
+    of: Ratio = 5.0
+    """Number of last frames that count for that."""
+    coast: Duration = 1.0
+    """How long a confirmed track is kept after the last detection [s]."""
 
 
 class WorksSection(ShapedSection):

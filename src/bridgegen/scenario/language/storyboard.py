@@ -22,6 +22,7 @@ from bridgegen.scenario.language.schema_types import Formula, ShapedSection, Tex
 from bridgegen.scenario.language.story import (
     CONDITIONS,
     GHOST_UNITS,
+    TRACKER_UNITS,
     Action,
     Arrival,
     Change,
@@ -46,6 +47,7 @@ from bridgegen.scenario.language.story_schema import (
     ParticipantSection,
     PassSection,
     RouteChangeSection,
+    TrackerSection,
     WaypointSection,
     WorksSection,
 )
@@ -105,7 +107,7 @@ class Storyboard:
     Attributes:
         participants: as ``LogicalScenario`` holds them.
         events: likewise.
-        ghosts: likewise.
+        perception: likewise, ghosts and the numbers of the tracker.
         known: the participants' names, also of those that are described wrongly.
         derived: the weathers between, where one changes over a time.
 
@@ -135,7 +137,7 @@ class Storyboard:
         self.participants += tuple(self._doors())
         self._acting = {participant.name: participant for participant in self.participants}
         self.events = tuple(self._events())
-        self.ghosts = tuple(self._ghosts())
+        self.perception = tuple(self._ghosts()), self._tracker()
 
     # -- participants --------------------------------------------------------------------------
 
@@ -358,16 +360,42 @@ class Storyboard:
                 continue
             if not name.isidentifier() or not name.isascii():
                 self._report(f"a ghost's name is a word, got '{name}'", path)
-            if (given.at is None) == (given.rate is None):
-                self._report(f"ghost {name} must have a place (at) or a rate, one of the two", path)
+            stated = [given.at, given.rate, given.mirrors].count(None) == 2
+            if not stated or (given.mirrors is None) != (given.aside is None):
+                what = "a place (at), a rate, or mirrors with aside"
+                self._report(f"ghost {name} must have {what}, one of the three", path)
+            if given.mirrors == EGO or given.mirrors not in (None, *self.known):
+                what = f"ghosts.{name}.mirrors must name another participant"
+                self._report(f"{what}, got '{given.mirrors}'", path)
             numbers = {w: value for w in GHOST_UNITS if (value := getattr(given, w)) is not None}
             for word, value in numbers.items():
-                above = word in ("rate", "appears", "lifetime")
-                self._check(value, GHOST_UNITS[word], (*path, word), above=above)
+                above = word in ("rate", "appears", "lifetime", "share")
+                low = -math.inf if word == "aside" else 0.0
+                self._check(value, GHOST_UNITS[word], (*path, word), low=low, above=above)
             near, far = given.vanishes, given.appears
             if not isinstance(near, str) and not isinstance(far, str) and near >= far:
                 self._report(f"vanishes < appears [m] must hold, got {near:g} and {far:g}", path)
-            yield Ghost(name, given.type, numbers)
+            yield Ghost(name, given.type, numbers, given.mirrors or "")
+
+    def _tracker(self) -> dict[str, Quantity]:
+        given = section(TrackerSection, dict(entries(self._quantities.document, "tracker")) or None)
+        if given is None:
+            return {}
+        numbers: dict[str, Quantity] = {word: getattr(given, word) for word in TRACKER_UNITS}
+        for word, value in numbers.items():
+            low = 1.0 if word in ("confirm", "of") else 0.0
+            self._check(value, TRACKER_UNITS[word], ("tracker", word), low=low)
+        for word, limit in (("extent", 1.0), ("of", 30.0)):  # frames of `_tracking_kernels`
+            highest = self._places.range_of(numbers[word])[1]
+            if limit < highest < math.inf:
+                what = f"tracker.{word} [1] must be at most {limit:g}, got {highest:g}"
+                self._report(what, ("tracker", word))
+        if self._places.range_of(given.confirm)[0] > self._places.range_of(given.of)[1]:
+            what = f"confirm <= of must hold, got {given.confirm} and {given.of}"
+            self._report(what, ("tracker",))
+        if (given.angle == 0.0) != (given.range == 0.0):
+            self._report("tracker must have angle and range, or neither", ("tracker",))
+        return numbers
 
     def _route_change(
         self, start: Waypoint, end: Waypoint, given: RouteChangeSection, path: Path

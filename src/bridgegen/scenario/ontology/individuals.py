@@ -22,9 +22,9 @@ from bridgegen.scenario.ontology.site import Site
 from bridgegen.scenario.ontology.story import (
     EGO,
     add_event,
-    add_ghosts,
     add_jam,
     add_participant,
+    add_perception,
     add_weather,
     add_works,
 )
@@ -171,7 +171,7 @@ def build(
     put(top, "has_road_network", add_road_network(builder, place))
     for participant in story.participants:
         put(top, "has_participant", add_participant(builder, participant, place, driver, ideal))
-    add_ghosts(builder, story.ghosts)
+    add_perception(builder, story)
     if odd:
         put(builder.iri(EGO), "has_odd", odd)
     for event in story.events:

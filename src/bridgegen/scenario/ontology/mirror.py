@@ -18,6 +18,7 @@ NEGATED = tuple(
             "has_heading", "has_lane_id", "has_t", "has_world_y", "has_world_yaw", "has_world_roll",
             "has_start_curvature", "has_end_curvature", "has_lateral_offset",
             "has_relative_heading", "has_lane_count", "has_target_offset",
+            "has_ghost_aside",
         ),
     )
 )  # fmt: skip

@@ -13,7 +13,6 @@ from bridgegen.scenario.language.story import (
     Change,
     ConditionSpec,
     EventSpec,
-    Ghost,
     Indication,
     Jam,
     KeepDistance,
@@ -23,6 +22,7 @@ from bridgegen.scenario.language.story import (
     Participant,
     RoadWorks,
     SpeedChange,
+    Story,
     Waypoint,
     WeatherChange,
 )
@@ -128,15 +128,20 @@ def add_participant(
     return node
 
 
-def add_ghosts(builder: Builder, ghosts: Iterable[Ghost]) -> None:
-    """Add the false positives of the ego's sensors, which its controller has."""
-    for ghost in ghosts:
+def add_perception(builder: Builder, story: Story) -> None:
+    """Add the false positives of the ego's sensors and its tracker, which its controller has."""
+    controller = builder.iri(f"{EGO}_controller")
+    for name, value in story.tracker.items():
+        builder.quantity(controller, f"has_tracker_{name}", value)
+    for ghost in story.ghosts:
         node = builder.node(ghost.name, "Ghost")
         builder.put(node, "has_name", ghost.name)
         builder.put(node, "has_ghost_type", ghost.type)
+        if ghost.mirrors:
+            builder.put(node, "has_ghost_mirrors", ghost.mirrors)
         for name, value in ghost.numbers.items():
             builder.quantity(node, f"has_ghost_{name}", value)
-        builder.put(builder.iri(f"{EGO}_controller"), "has_ghost", node)
+        builder.put(controller, "has_ghost", node)
 
 
 def _add_body(builder: Builder, node: ox.NamedNode, body: Body) -> None:

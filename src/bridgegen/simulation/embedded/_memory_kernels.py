@@ -83,6 +83,7 @@ class Plan(NamedTuple):
     stops_in_lane: int
     scene: Float
     ghosts: Int
+    tracker: Int
     others: Int
     attends: int
     heeds: int

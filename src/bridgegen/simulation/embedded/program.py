@@ -282,8 +282,10 @@ class Program:
         vehicle: how its body moves, one of `bridgegen.simulation.vehicles.VEHICLES`.
         chassis: of a vehicle with dynamics, see ``_chassis_columns`` and ``_multi_body_columns``;
             else empty.
-        ghosts: ``(G, 8)`` false positives of the ego's sensors, see
+        ghosts: ``(G, 11)`` false positives of the ego's sensors, see
             `bridgegen.drivers._ghost_kernels`.
+        tracker: ``(6,)`` slots of what its tracker resolves and confirms, see
+            `bridgegen.drivers._tracking_kernels`; empty where the file says nothing.
         others: ``(E,)`` who drives each of the others, a code of
             `bridgegen.drivers.drivers`; the ego's is not looked at.
         time_step: [s].
@@ -356,6 +358,7 @@ class Program:
     vehicle: str
     chassis: Float
     ghosts: Int
+    tracker: Int
     others: Int
     time_step: float
     n_steps: int

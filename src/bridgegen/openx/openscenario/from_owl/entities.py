@@ -8,10 +8,10 @@ from functools import partial
 from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import EntityBody, entity_body
-from bridgegen.openx.openscenario.declarations import DRIVER, GHOST, IDEAL, ODD, SIREN
+from bridgegen.openx.openscenario.declarations import DRIVER, GHOST, IDEAL, ODD, SIREN, TRACKER
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity, quoted_element
 from bridgegen.openx.openscenario.values import Double, format_double
-from bridgegen.scenario.language.story import GHOST_UNITS
+from bridgegen.scenario.language.story import GHOST_UNITS, TRACKER_UNITS
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import Subject
 from bridgegen.scenario.participants import PARTICIPANTS, Body, ParticipantKind
@@ -138,15 +138,20 @@ def _controller(
     said = [osc.Property(DRIVER, driver), osc.Property("esminiController", _ESMINI_CONTROLLER)]
     if individuals.optional_text(node, "has_ideal_stages") is not None:
         said.append(osc.Property(IDEAL, plain_text(individuals, node, "has_ideal_stages")))
-    for ghost in individuals.links(node, "has_ghost"):
-        key = f"{GHOST}.{plain_text(individuals, ghost, 'has_name')}"
-        kind = plain_text(individuals, ghost, "has_ghost_type")
-        said.append(osc.Property(f"{key}.type", kind))
-        for word in GHOST_UNITS:
-            if individuals.optional_number(ghost, f"has_ghost_{word}") is not None:
-                value = quantities.get(ghost, f"has_ghost_{word}")
-                text = format_double(value) if isinstance(value, float) else value
-                said.append(osc.Property(f"{key}.{word}", text))
+    for part in (*individuals.links(node, "has_ghost"), node):
+        prefix, key, words = "has_tracker", TRACKER, TRACKER_UNITS
+        if part != node:
+            prefix, words = "has_ghost", GHOST_UNITS
+            key = f"{GHOST}.{plain_text(individuals, part, 'has_name')}"
+            for word in ("type", "mirrors"):
+                if individuals.optional_text(part, f"has_ghost_{word}") is not None:
+                    text = plain_text(individuals, part, f"has_ghost_{word}")
+                    said.append(osc.Property(f"{key}.{word}", text))
+        for word in words:
+            if individuals.optional_number(part, f"{prefix}_{word}") is not None:
+                value = quantities.get(part, f"{prefix}_{word}")
+                shown = format_double(value) if isinstance(value, float) else value
+                said.append(osc.Property(f"{key}.{word}", shown))
     properties = osc.Properties(tuple(said))
     name = plain_text(individuals, node, "has_name")
     return osc.ObjectController(osc.Controller(name, properties))

@@ -6,7 +6,7 @@ import pyoxigraph as ox
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import kind_of
-from bridgegen.openx.openscenario.declarations import DRIVER, GHOST, IDEAL
+from bridgegen.openx.openscenario.declarations import DRIVER, GHOST, IDEAL, TRACKER
 from bridgegen.openx.openscenario.from_owl.entities import LIFTED, MAX_SPEED
 from bridgegen.openx.openscenario.to_owl.actions import (
     add_action,
@@ -25,7 +25,7 @@ from bridgegen.openx.openscenario.to_owl.build import (
 from bridgegen.openx.openscenario.to_owl.differences import is_detail
 from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.places import add_position
-from bridgegen.scenario.language.story import GHOST_UNITS
+from bridgegen.scenario.language.story import GHOST_UNITS, TRACKER_UNITS
 from bridgegen.scenario.named_models import MODELS
 from bridgegen.scenario.participants import PARTICIPANTS
 
@@ -245,14 +245,17 @@ def _add_controller(
     ghosts: dict[str, ox.NamedNode] = {}
     for said in item.properties.properties if item.properties else ():
         prefix, ghost, word = (*builder.text(said.name).split(".", 2), "", "")[:3]
-        if prefix != GHOST or word not in ("type", *GHOST_UNITS):
+        if prefix == TRACKER and ghost in TRACKER_UNITS and not word:
+            as_number(builder, said.value, said)
+            builder.number(controller, f"has_tracker_{ghost}", said.value, said)
+        if prefix != GHOST or word not in ("type", "mirrors", *GHOST_UNITS):
             continue
         if ghost not in ghosts:
             ghosts[ghost] = builder.node(ghost, "Ghost")
             builder.put(ghosts[ghost], "has_name", ghost)
             builder.put(controller, "has_ghost", ghosts[ghost])
-        if word == "type":
-            builder.put(ghosts[ghost], "has_ghost_type", builder.text(said.value))
+        if word in ("type", "mirrors"):
+            builder.put(ghosts[ghost], f"has_ghost_{word}", builder.text(said.value))
         else:
             as_number(builder, said.value, said)
             builder.number(ghosts[ghost], f"has_ghost_{word}", said.value, said)

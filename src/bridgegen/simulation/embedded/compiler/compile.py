@@ -282,6 +282,7 @@ class _Compiler:
         waits = (table(self.triggers.probes, 11)[:, PROBE] == END_OF_ROAD).any()
         leaves = len(objects) > 1 and not waits and not declared.stands(self.scenario, self.place)
         ghosts = declared.ghosts(self.controllers, self.tables)  # before the slots are read
+        tracker = declared.tracker(self.controllers, self.tables)
         moves = declared.vehicle(self.controllers, self.place, vehicle, has_driver=has_driver)
         return Program(
             place=self.place,
@@ -356,6 +357,7 @@ class _Compiler:
             vehicle=moves,
             chassis=self._chassis(moves, objects[0], bodies[0], tows),
             ghosts=ghosts,
+            tracker=tracker,
             others=others_drivers,
             time_step=step,
             n_steps=n_steps,

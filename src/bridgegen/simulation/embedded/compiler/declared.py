@@ -5,10 +5,14 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
 
 from bridgegen.base.arrays import Int
 from bridgegen.base.errors import InputError, UnknownNameError, UnsupportedError
 from bridgegen.drivers import DRIVERS, GUESTS, STORYBOARD, Driver, get, is_planner, is_spec, split
+from bridgegen.drivers import _tracking_kernels as tracking
 from bridgegen.drivers.drivers import CODES, STOP_IN_LANE
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
@@ -21,12 +25,13 @@ from bridgegen.openx.openscenario.declarations import (
     ROAD_END,
     STAND,
     TIME_STEP,
+    TRACKER,
     VEHICLE,
 )
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.parameters import kind_of
 from bridgegen.openx.openscenario.values import Kind, Value
-from bridgegen.scenario.language.story import GHOST_UNITS
+from bridgegen.scenario.language.story import GHOST_UNITS, TRACKER_UNITS
 from bridgegen.scenario.participants import PARTICIPANTS
 from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
@@ -210,32 +215,64 @@ def ghosts(controllers: Controllers, tables: Tables) -> Int:
         where = f"{tables.place}, line {next(iter(words.values())).line}: {GHOST}.{name}"
         has = words.keys()
         if not (
-            {"type", "appears"} <= has <= {"type", *GHOST_UNITS} and ("at" in has) ^ ("rate" in has)
+            {"type", "appears"} <= has <= {"type", "mirrors", *GHOST_UNITS}
+            and len({"at", "rate", "mirrors"} & has) == 1
+            and ("mirrors" in has) == ("aside" in has)
         ):
             raise InputError(
-                f"{where} must have type, appears, and at or rate; may have vanishes and lifetime; "
-                f"got {', '.join(words)}"
+                f"{where} must have type, appears, and at, rate, or mirrors with aside; may have "
+                f"vanishes, lifetime and share; got {', '.join(words)}"
             )
+        whose = tables.text(words["mirrors"].value) if "mirrors" in words else None
+        if whose is not None and whose not in tables.names[1:]:
+            raise InputError(f"{where}.mirrors must name an entity, not the ego, got '{whose}'")
         said_type = tables.text(words["type"].value)
         if said_type not in PARTICIPANTS:
             known = ", ".join(PARTICIPANTS)
             raise InputError(f"{where}.type must be one of {known}, got '{said_type}'")
-        slots = {"vanishes": tables.slot(0.0), "lifetime": tables.slot(60.0)}
-        for word in (word for word in GHOST_UNITS if word in words):
-            text = words[word].value
-            varies = isinstance(text, osc.ParameterRef) and text.name in tables.parameters
-            value: Value | None = text if varies else _number(tables.text(text))
-            if value is None or not 0.0 <= tables.declared(value) < math.inf:
-                raise InputError(
-                    f"{where}.{word} [{GHOST_UNITS[word]}] must be a finite number of at least 0, "
-                    f"got '{text}'"
-                )
-            slots[word] = tables.slot(value)
+        usual = {"vanishes": 0.0, "lifetime": 60.0, "share": 1.0}
+        slots = {word: tables.slot(value) for word, value in usual.items()}
+        for word, unit in GHOST_UNITS.items():
+            if word in words:
+                low = -math.inf if word == "aside" else 0.0
+                slots[word] = _slot(tables, words[word].value, f"{where}.{word} [{unit}]", low)
         kind = PARTICIPANTS[said_type]
         size = tables.slot(kind.body.length), tables.slot(kind.body.width)
         what = NAMES.index(kind.seen_as.name)
-        rows.append((*(slots.get(word, -1) for word in GHOST_UNITS), *size, what))
-    return table(rows, 8)
+        mirrors = -1 if whose is None else tables.names.index(whose)
+        rows.append((*(slots.get(word, -1) for word in GHOST_UNITS), *size, what, mirrors))
+    return table(rows, 11)
+
+
+def tracker(controllers: Controllers, tables: Tables) -> Int:
+    """Return `Program.tracker`; raise `InputError` as `ghosts` does."""
+    found: dict[str, int] = {}
+    for controller in controllers.of(0):
+        for item in controller.properties.properties if controller.properties else ():
+            prefix, _, word = str(item.name).partition(".")
+            if prefix != TRACKER:
+                continue
+            where = f"{tables.place}, line {item.line}: {TRACKER}.{word}"
+            if word not in TRACKER_UNITS:
+                raise InputError(f"{where}: a tracker has {', '.join(TRACKER_UNITS)}")
+            low = 1.0 if word in ("confirm", "of") else 0.0
+            high = {"extent": 1.0, "of": float(tracking.MOST_FRAMES)}.get(word, math.inf)
+            found[word] = _slot(tables, item.value, f"{where} [{TRACKER_UNITS[word]}]", low, high)
+    usual = zip(TRACKER_UNITS, tracking.TRACKER, strict=True) if found else ()
+    slots = [found.get(word, tables.slot(value)) for word, value in usual]
+    return np.array(slots, dtype=np.int64)
+
+
+def _slot(tables: Tables, text: Any, what: str, low: float, high: float = math.inf) -> int:
+    """Return the slot of a property's value, a number or a parameter, from ``low`` to ``high``."""
+    varies = isinstance(text, osc.ParameterRef) and text.name in tables.parameters
+    value: Value | None = text if varies else _number(tables.text(text))
+    number = math.nan if value is None else tables.declared(value)
+    if value is None or not (low <= number <= high and math.isfinite(number)):
+        rule = "" if low == -math.inf else f" of at least {low:g}"
+        rule += "" if high == math.inf else f" and at most {high:g}"
+        raise InputError(f"{what} must be a finite number{rule}, got '{text}'")
+    return tables.slot(value)
 
 
 # --- The elements of a storyboard in the order of the file ---

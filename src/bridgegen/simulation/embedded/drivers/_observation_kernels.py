@@ -9,6 +9,7 @@ from bridgegen.base.compiled import bundled, bundled_row, kernel
 from bridgegen.drivers._ghost_kernels import haunt
 from bridgegen.drivers._path_kernels import CURVATURE, locate, pose
 from bridgegen.drivers._perception_kernels import perceive
+from bridgegen.drivers._tracking_kernels import settings
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
 )
@@ -25,8 +26,8 @@ def observe(k, plan, roads, state, record, step, route, tracks):
     # put harm down to perception.
     perceive(
         k, plan.dt, state.key[0], plan.ideal_perception, state.visible, record.x, record.y,
-        record.h, record.v, plan.bodies, plan.kinds, state.lamps, state.weather, state.sensors,
-        state.tracks, record.detections,
+        record.h, record.v, plan.bodies, plan.kinds, state.lamps, state.weather,
+        settings(plan.tracker, state.slots), state.sensors, state.tracks, record.detections,
     )  # fmt: skip
     haunt(k, plan, roads, state, record)
     for e in range(tracks.shape[0]):
