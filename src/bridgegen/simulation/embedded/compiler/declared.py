@@ -233,9 +233,9 @@ def ghosts(controllers: Controllers, tables: Tables) -> Int:
         usual = {"vanishes": 0.0, "lifetime": 60.0, "share": 1.0}
         slots = {word: tables.slot(value) for word, value in usual.items()}
         for word in (word for word in GHOST_UNITS if word in words):
-            what = f"{where}.{word} [{GHOST_UNITS[word]}]"
+            place = f"{where}.{word} [{GHOST_UNITS[word]}]"
             low = -math.inf if word == "aside" else 0.0
-            slots[word] = _slot(tables, words[word].value, what, low)
+            slots[word] = _slot(tables, words[word].value, place, low)
         kind = PARTICIPANTS[said_type]
         size = tables.slot(kind.body.length), tables.slot(kind.body.width)
         what = NAMES.index(kind.seen_as.name)
