@@ -167,7 +167,7 @@ def look(k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, tra
         along, across = COLOURED * along, COLOURED * across
         memory[e, VAR_X] = along * ux * ux + across * uy * uy
         memory[e, VAR_Y] = along * uy * uy + across * ux * ux
-    if tracker[tracking.ANGLE] > 0.0 and near > 1:
+    if tracker[tracking.ANGLE] > 0.0:  # also of one body, which may have been one with another
         merge(tracker, bodies, memory, detections, k)
     for e in range(1, x.shape[0]):
         if memory[e, INTO] > 0.0:

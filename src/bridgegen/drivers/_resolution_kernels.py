@@ -66,8 +66,7 @@ def enclose(detections, k, a, b, extent):
     )
     turn = detections[b, k, HEADING] - detections[a, k, HEADING]
     c, s = abs(elementary.cos(turn)), abs(elementary.sin(turn))
-    dx = detections[b, k, X] - detections[a, k, X]
-    dy = detections[b, k, Y] - detections[a, k, Y]
+    dx, dy = detections[b, k, X] - detections[a, k, X], detections[b, k, Y] - detections[a, k, Y]
     long, wide = 0.5 * detections[b, k, LENGTH], 0.5 * detections[b, k, WIDTH]
     own = 0.5 * detections[a, k, LENGTH], 0.5 * detections[a, k, WIDTH]
     at = dx * cosine + dy * sine, dy * cosine - dx * sine

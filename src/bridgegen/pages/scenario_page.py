@@ -73,8 +73,7 @@ def _lines(scenario: LogicalScenario) -> Iterator[str]:
 def _ghost(ghost: Ghost) -> str:
     said = (f"{name} {in_words(value, GHOST_UNITS[name])}" for name, value in ghost.numbers.items())
     where = f"as a mirror image of {ghost.mirrors}" if ghost.mirrors else "where nothing is"
-    what = f"the ego's sensors report a {ghost.type} {where}"
-    return f"{ghost.name}: {what} ({', '.join(said)})."
+    return f"{ghost.name}: the ego's sensors report a {ghost.type} {where} ({', '.join(said)})."
 
 
 def _participant(participant: Participant, scenario: LogicalScenario) -> str:

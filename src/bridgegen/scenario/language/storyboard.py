@@ -391,8 +391,7 @@ class Storyboard:
                 what = f"tracker.{word} [1] must be at most {limit:g}, got {highest:g}"
                 self._report(what, ("tracker", word))
         if self._places.range_of(given.confirm)[0] > self._places.range_of(given.of)[1]:
-            what = f"confirm <= of must hold, got {given.confirm} and {given.of}"
-            self._report(what, ("tracker",))
+            self._report(f"confirm <= of must hold, got {given.confirm}, {given.of}", ("tracker",))
         if (given.angle == 0.0) != (given.range == 0.0):
             self._report("tracker must have angle and range, or neither", ("tracker",))
         return numbers

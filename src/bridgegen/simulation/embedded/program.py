@@ -284,8 +284,7 @@ class Program:
             else empty.
         ghosts: ``(G, 11)`` false positives of the ego's sensors, see
             `bridgegen.drivers._ghost_kernels`.
-        tracker: ``(6,)`` slots of what its tracker resolves and confirms, see
-            `bridgegen.drivers._tracking_kernels`; empty where the file says nothing.
+        tracker: ``(6,)`` slots, see `bridgegen.drivers._tracking_kernels`; empty if not stated.
         others: ``(E,)`` who drives each of the others, a code of
             `bridgegen.drivers.drivers`; the ego's is not looked at.
         time_step: [s].

@@ -232,10 +232,10 @@ def ghosts(controllers: Controllers, tables: Tables) -> Int:
             raise InputError(f"{where}.type must be one of {known}, got '{said_type}'")
         usual = {"vanishes": 0.0, "lifetime": 60.0, "share": 1.0}
         slots = {word: tables.slot(value) for word, value in usual.items()}
-        for word, unit in GHOST_UNITS.items():
-            if word in words:
-                low = -math.inf if word == "aside" else 0.0
-                slots[word] = _slot(tables, words[word].value, f"{where}.{word} [{unit}]", low)
+        for word in (word for word in GHOST_UNITS if word in words):
+            place = f"{where}.{word} [{GHOST_UNITS[word]}]"
+            low = -math.inf if word == "aside" else 0.0
+            slots[word] = _slot(tables, words[word].value, place, low)
         kind = PARTICIPANTS[said_type]
         size = tables.slot(kind.body.length), tables.slot(kind.body.width)
         what = NAMES.index(kind.seen_as.name)
@@ -270,7 +270,7 @@ def _slot(tables: Tables, text: Any, what: str, low: float, high: float = math.i
     number = math.nan if value is None else tables.declared(value)
     if value is None or not (low <= number <= high and math.isfinite(number)):
         rule = "" if low == -math.inf else f" of at least {low:g}"
-        rule += "" if high == math.inf else f" and at most {high:g}"
+        rule += f" and at most {high:g}" if high < math.inf else ""
         raise InputError(f"{what} must be a finite number{rule}, got '{text}'")
     return tables.slot(value)
 
