@@ -99,6 +99,7 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "steps": steps_in_words(found),
         "missed": found.missed,
         "extrapolated": found.extrapolated,
+        **({"rate": found.rate.sentence} if found.rate else {}),
         "judged": _judged(found),
         "bound": {
             "sentence": found.bound.in_full,
@@ -126,7 +127,7 @@ def _mode(mode: Mode, tested: Neighbourhood | None) -> dict[str, Any]:
         include={
             "number", "title", "conflict", "conflict_type", "responsible", "rule", "partner",
             "place", "cause", "judgement", "tested", "count", "harm", "severity", "shown", "worst",
-            "robustness", "space",
+            "robustness", "space", *(["probability"] if mode.probability else []),
         }
     )  # fmt: skip
     return facts | {

@@ -20,6 +20,7 @@ def mode_in_words(mode: Mode, found: Triage) -> str:
         parts.append(f"MAIS3+ {percent(mode.severity)}")
     else:
         parts.append(f"harm {mode.harm:.2f}")
+    parts.append(f"P {mode.probability.sentence}" if mode.probability else "")
     parts.append(robustness_in_words(mode, found))
     parts.append(step_in_words(mode, found))
     parts.append(mode.judgement or mode.cause)
