@@ -62,6 +62,10 @@ LIKELY = 7
 """Number of ten seeking rows that are likely critical, once a critical row is known."""
 
 
+DOUBT = 1.25
+"""By what deviations of a model are divided: models of a few hundred rows are too certain."""
+
+
 class Everywhere:
     """The road of a search without an exposure: the unit cube, uniformly; see `Road`."""
 
@@ -135,6 +139,22 @@ class _Pool:
     even: Float
 
 
+@dataclass(frozen=True)
+class _Model:
+    """What the rows so far say of a pool.
+
+    Attributes:
+        objective: a process of the objective.
+        by_label: ``(m,)``, by how many deviations each point lies on the harmful side, by a process
+            of the label; None before both labels are known.
+        likely: ``(m,)``, how likely harm is; likewise.
+    """
+
+    objective: GaussianProcess
+    by_label: Float | None
+    likely: Float | None
+
+
 class Rate:
     """Failures, and how often they happen, from one budget; see the module."""
 
@@ -177,18 +197,17 @@ class Rate:
         pool = self._pool()
         as_road, evenly = values["road"], values["even"]
         blind = as_road * _shared(pool.road) + evenly * _shared(pool.even)
-        likely = self._likely(pool)
-        seek = self._seeker(pool, likely, n) if len(known) else None
-        if likely is not None:
-            known_share = as_road + evenly + values["rate"]
-            base = blind + values["rate"] * _shared(pool.road * likely)
-        else:
-            known_share, base = as_road + evenly, blind
+        model = self._model(pool) if len(known) else None
+        seek = self._seeker(pool, model, n) if model else None
+        stated, base = as_road + evenly, blind
+        if model and model.likely is not None:
+            stated += values["rate"]
+            base = blind + values["rate"] * _shared(pool.road * model.likely)
         taken: list[int] = []
         chances, parts = np.empty(n), np.empty(n)
         for k in range(n):
-            scale = 1.0 if seek else 1.0 / known_share
-            chance = base + (1.0 - known_share) * seek(k, taken) if seek else base * scale
+            scale = 1.0 if seek else 1.0 / stated
+            chance = base + (1.0 - stated) * seek(k, taken) if seek else base * scale
             total = np.cumsum(chance)
             at = int(np.searchsorted(total, self._rng.random() * total[-1], side="right"))
             at = min(at, len(total) - 1)
@@ -239,34 +258,34 @@ class Rate:
         points, U = points[good], U[good]
         return _Pool(points, U, known.columns.points(U), of_road[good], of_even[good])
 
-    def _likely(self, pool: _Pool) -> Float | None:
-        """Return how likely harm is at the points of a pool; None before both labels are known."""
+    def _model(self, pool: _Pool) -> _Model:
+        """Return what the rows so far say of the points of a pool."""
         known = self._known
-        if not known.critical.any() or known.critical.all():
-            return None
+        scores, critical = known.scores(), known.critical
+        rows = telling(scores, MODEL_ROWS)
+        objective = GaussianProcess(known.points[rows], scores[rows], self._of_objective)
+        self._of_objective = objective.parameters
+        if not critical.any() or critical.all():
+            return _Model(objective, None, None)
         # As in `Surrogate`: harm leaps where a row becomes critical.
-        scale = known.critical.std()
-        label = -known.critical.astype(np.float64) / scale
+        scale = critical.std()
+        label = -critical.astype(np.float64) / scale
         rows = telling(label, MODEL_ROWS)
         process = GaussianProcess(known.points[rows], label[rows], self._of_label)
         self._of_label = process.parameters
-        mean, deviation = process.predict(pool.points)
-        spread = np.sqrt(deviation**2 + process.parameters.noise)
-        # Never 0, so that the shares of a pool are defined.
-        found: Float = np.maximum(ndtr((-0.5 / scale - mean) / spread), 1e-12)
-        return found
+        by_label = _deviations(process, pool.points, -0.5 / scale)
+        least = 0.5 * float(scores[critical].max() + scores[~critical].min())
+        by_objective = _deviations(objective, pool.points, least)
+        # Either process misses what the other one knows: of the failures of crossroads-s4, the
+        # variance was half of that with the label alone.
+        both = ndtr(np.maximum(by_label, by_objective) / DOUBT)
+        return _Model(objective, by_label, np.maximum(both, 1e-12))
 
-    def _seeker(
-        self, pool: _Pool, likely: Float | None, n: int
-    ) -> Callable[[int, list[int]], Float]:
+    def _seeker(self, pool: _Pool, model: _Model, n: int) -> Callable[[int, list[int]], Float]:
         """Return the chances of seeking rows: of the k-th row, after others of its batch."""
         known, rng = self._known, self._rng
-        scores = known.scores()
-        rows = telling(scores, MODEL_ROWS)
-        process = GaussianProcess(known.points[rows], scores[rows], self._of_objective)
-        self._of_objective = process.parameters
         some = rng.permutation(len(pool.U))[:PATHS]
-        paths = process.sample(pool.points[some], max(n // 3, 1), rng)
+        paths = model.objective.sample(pool.points[some], max(n // 3, 1), rng)
         off = distances(pool.points, known.points[known.distinct])
         apart, joined = self._values["apart"], 0
 
@@ -279,8 +298,9 @@ class Rate:
                 apart /= 2.0
             free = off >= apart
             chance = np.zeros(len(off))
-            if likely is not None and k % 10 < LIKELY:
-                best = np.argsort(np.where(free, -likely, 1.0), kind="stable")[:TOP]
+            if model.by_label is not None and k % 10 < LIKELY:
+                order = np.where(free, -model.by_label, np.inf)
+                best = np.argsort(order, kind="stable")[:TOP]
             else:
                 path = np.where(free[some], paths[k % len(paths)], np.inf)
                 best = some[np.argsort(path, kind="stable")[:TOP]]
@@ -288,6 +308,13 @@ class Rate:
             return chance
 
         return seek
+
+
+def _deviations(process: GaussianProcess, points: Float, limit: float) -> Float:
+    """Return by how many standard deviations a process is expected below a limit."""
+    mean, deviation = process.predict(points)
+    found: Float = (limit - mean) / np.sqrt(deviation**2 + process.parameters.noise)
+    return found
 
 
 def _shared(values: Float) -> Float:
