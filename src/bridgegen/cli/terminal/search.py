@@ -246,7 +246,11 @@ def _mode_lines(found: "Triage") -> list[str]:
 
 def _found_lines(found: "Triage") -> list[str]:
     """Return how common failures are, the simplest one, what matters, and what does not count."""
-    from bridgegen.search.triage.words import parameters_in_words, steps_in_words
+    from bridgegen.search.triage.words import (
+        covered_in_words,
+        parameters_in_words,
+        steps_in_words,
+    )
 
     space, lines = found.bound.space, list[str]()
     if found.rate is not None:
@@ -259,6 +263,8 @@ def _found_lines(found: "Triage") -> list[str]:
             else f"at most {percent(space.high)} of random scenarios fail"
         )
         lines.append(f"How common: {share}; {space.measure}, 95 % confidence; not a rate on roads")
+        if covered := covered_in_words(found):
+            lines.append(f"Found of it: of {space.rows} random scenarios, {covered}")
     simplest = [mode.minimal for mode in found.modes if mode.minimal is not None]
     if simplest:
         lines.append(f"Simplest: {simplest[0].sentence}")

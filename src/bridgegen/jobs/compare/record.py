@@ -114,6 +114,7 @@ class Record:
         reached: by k, the evaluations until the k-th critical one; +inf if there is none.
         seconds: [s] that it took.
         seconds_reached: [s] by k, likewise.
+        points: ``(n, k)`` float64, the critical ones, see `normalised`; at most `LIMIT`.
         distinct: how many different critical scenarios it found.
         distinct_reached: by k, the evaluations until the k-th different one; likewise.
         distinct_found: ``(c,)`` int64, different critical scenarios by the c points of its curve.
@@ -139,6 +140,7 @@ class Record:
     reached: Mapping[int, float]
     seconds: float
     seconds_reached: Mapping[int, float]
+    points: Float
     distinct: int
     distinct_reached: Mapping[int, float]
     distinct_found: Int
@@ -218,7 +220,8 @@ def read(
     n = len(critical)
     # A greedy net in the run's own order. Single linkage forms chains: of 1,000 random rows of S4
     # it makes 8 clusters where the net counts 241.
-    is_new = distinct(normalised(space, critical), apart, n_var=space.n_var)
+    where = normalised(space, critical)
+    is_new = distinct(where, apart, n_var=space.n_var)
     new_at = [reader.hits[k][0] for k in np.flatnonzero(is_new).tolist()]
     bins = coverage(space, critical, np.ones(n, np.bool_), strength=2, sample=0).ways
     hits = reader.hits
@@ -235,6 +238,7 @@ def read(
         reached={k: float(hits[k - 1][0]) if k <= n else float("inf") for k in ks},
         seconds=seconds,
         seconds_reached={k: hits[k - 1][1] if k <= n else float("inf") for k in ks},
+        points=where[:LIMIT],
         distinct=len(new_at),
         distinct_reached={DISTINCT: _reached(new_at, DISTINCT)},
         distinct_found=np.searchsorted(new_at, points(budget), side="right").astype(np.int64),

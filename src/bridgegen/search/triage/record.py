@@ -24,6 +24,10 @@ MOST_EXAMPLES = 20
 
 MOST_NEIGHBOURHOODS = 2000
 
+NEAR = 0.1
+"""Distance within which scenarios are no different ones: root mean square of the differences of the
+searched parameters, as shares of what is searched."""
+
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Change = Annotated[float, Field(ge=-1.0, le=1.0)]
@@ -89,10 +93,13 @@ class FreshRows(_Model):
     Attributes:
         harm: of each; None of one without a result, or with implausible traffic.
         mode: the number of the failure mode that each is of; 0 of no recorded one.
+        near: harmful ones within `NEAR` of a failure that was found; None in records of earlier
+            versions.
     """
 
     harm: Annotated[tuple[Share | None, ...], Field(max_length=10_000)]
     mode: Annotated[tuple[Count, ...], Field(max_length=10_000)]
+    near: Count | None = None
 
 
 class Frequency(_Model):

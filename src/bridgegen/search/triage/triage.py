@@ -19,6 +19,7 @@ from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.trials import EVENT
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.scenario.language.prior import surprise
+from bridgegen.search.surrogates.known import distances
 from bridgegen.search.triage.bound import (
     CONTACT,
     UNBIASED,
@@ -50,6 +51,7 @@ from bridgegen.search.triage.rates import how_likely
 from bridgegen.search.triage.record import (
     MOST_EXAMPLES,
     MOST_MODES,
+    NEAR,
     Drawn,
     Estimate,
     Frequency,
@@ -406,7 +408,12 @@ class _Triage:
                 mode[i] = same[int(np.argmin(gaps))] + 1
         ok = int(results.ok.sum())
         harm = zip(results.harm.tolist(), results.ok.tolist(), strict=True)
-        fresh = FreshRows(harm=tuple(item if has else None for item, has in harm), mode=tuple(mode))
+        off = distances(U[results.harmful & results.ok], own)
+        fresh = FreshRows(
+            harm=tuple(item if has else None for item, has in harm),
+            mode=tuple(mode),
+            near=int((off < NEAR).sum()),
+        )
         each = [drawn_of("fresh", mode.count(k), ok) for k in range(1, len(groups) + 1)]
         return drawn_of("fresh", int(results.harmful.sum()), ok), each, fresh
 

@@ -1,13 +1,27 @@
 """A run's triage in lines of text, for the terminal."""
 
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.base.units import percent
 from bridgegen.search.triage.influence import ends_in_words, in_words
-from bridgegen.search.triage.record import Mode, Triage
+from bridgegen.search.triage.record import NEAR, Mode, Triage
 
 
 def headline(found: Triage) -> str:
     """Return the number of failure modes, or the least margin, and the share of the space."""
     return found.bound.sentence
+
+
+def covered_in_words(found: Triage) -> str:
+    """Return which share of the fresh random failures lies near one that was found; "" if none."""
+    fresh, harmful = found.fresh, found.bound.space.harmful
+    if fresh is None or fresh.near is None or not harmful or not found.bound.harmful:
+        return ""
+    low, high = clopper_pearson(fresh.near, harmful)
+    return (
+        f"{fresh.near} of the {harmful} that fail, {percent(fresh.near / harmful)} ({percent(low)} "
+        f"to {percent(high)}), lie within {NEAR:g} of a failure found (root mean square of the "
+        "searched parameters' shares)"
+    )
 
 
 def mode_in_words(mode: Mode, found: Triage) -> str:
