@@ -181,6 +181,7 @@ class AnalyticRoad:
 
     def __init__(self, problem):
         self.problem, self.dimensions, self.share = problem, problem.dimensions, problem.share
+        self.continuous = np.ones(self.dimensions, np.bool_)
 
     def normal(self, U):
         return 8.0 * U - 4.0
@@ -195,6 +196,10 @@ class AnalyticRoad:
     def even_share(self):
         """One over the share of the cube that is feasible: rows of `even` are uniform in it."""
         return 1.0 / self.share[1]
+
+    def met(self, n, random):
+        Z = random.standard_normal((8 * n + 100, self.dimensions))
+        return Z[self.problem.feasible(Z)][:n]
 
     def even(self, n, random):
         Z = 8.0 * random.random((4 * n, self.dimensions)) - 4.0

@@ -17,6 +17,7 @@ class OnRoad:
     Attributes:
         dimensions: number of distributed parameters.
         share: the feasible share of the exposure, and its interval: low, estimate, high.
+        continuous: ``(dimensions,)``, which parameters do not take single values.
 
     Args:
         exposure: of the scenario.
@@ -31,6 +32,7 @@ class OnRoad:
         self._exposure, self._even, self._space = exposure, evenly(exposure), space
         self.dimensions, found = exposure.dimensions, exposure.feasible_share
         self.share = (found.low if found.estimate < 1.0 else 1.0, found.estimate, found.high)
+        self.continuous: Bool = np.array([not one.apart for one in exposure.marginals.values()])
         if held := [name for name in exposure.names if name not in space.variables]:
             raise InputError(
                 f"the exposure says how {', '.join(held)} varies, which this search holds at one "
@@ -52,6 +54,11 @@ class OnRoad:
         good[good] = kept
         log_even[good] = self._even.log_density(X[good]) - self._exposure.log_density(X[good])
         return U, good, log_even
+
+    def met(self, n: int, random: np.random.Generator) -> Float:
+        """See `bridgegen.search.algorithms.Road`."""
+        X = self._exposure.sample(n, int(random.integers(2**31))).X
+        return self._exposure.to_normal(X)
 
     def even(self, n: int, random: np.random.Generator) -> tuple[Float, Bool]:
         """See `bridgegen.search.algorithms.Road`."""

@@ -80,10 +80,13 @@ class Road(Protocol):
     Attributes:
         dimensions: of that space.
         share: how likely a standard normal point is feasible: low, middle and high value.
+        continuous: ``(dimensions,)``, which scores stand for a value each: of a parameter with
+            single values, many scores stand for one.
     """
 
     dimensions: int
     share: tuple[float, float, float]
+    continuous: Bool
 
     def rows(self, Z: Float) -> tuple[Float, Bool, Float]:
         """Return the rows that points stand for.
@@ -95,6 +98,10 @@ class Road(Protocol):
             U ``(N, n_var)``; ``(N,)`` which are feasible; and ``(N,)`` the logarithm of how much
             likelier each one is uniformly over the ranges than on the road.
         """
+        ...
+
+    def met(self, n: int, random: np.random.Generator) -> Float:
+        """Return n feasible points as on the road, ``(n, dimensions)``."""
         ...
 
     def even(self, n: int, random: np.random.Generator) -> tuple[Float, Bool]:

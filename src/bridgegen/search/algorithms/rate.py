@@ -42,6 +42,9 @@ POOL_ROAD, POOL_EVEN = 0.25, 0.25
 """Shares of a pool that are as on the road, and uniform over the ranges; the others lie near bases.
 Half each in the first pool, which has no bases."""
 
+MORE = 16.0
+"""Factor by which a pool has more points near bases, at most, where few of them can happen."""
+
 FOUND, BEST = 30, 10
 """Numbers of bases: the distinct critical rows found last, and the best rows."""
 
@@ -72,11 +75,15 @@ class Everywhere:
     share = (1.0, 1.0, 1.0)
 
     def __init__(self, n_var: int) -> None:
-        self.dimensions = n_var
+        self.dimensions, self.continuous = n_var, np.ones(n_var, np.bool_)
 
     def rows(self, Z: Float) -> tuple[Float, Bool, Float]:
         """See `Road`."""
         return ndtr(Z), np.ones(len(Z), np.bool_), np.zeros(len(Z))
+
+    def met(self, n: int, random: np.random.Generator) -> Float:
+        """See `Road`."""
+        return random.standard_normal((n, self.dimensions))
 
     def even(self, n: int, random: np.random.Generator) -> tuple[Float, Bool]:
         """See `Road`."""
@@ -130,6 +137,7 @@ class _Pool:
         points: ``(m, n_var)``, what a model sees of U.
         road: ``(m,)``, how much likelier each one is on the road than in the pool.
         even: ``(m,)``, likewise, among rows that are uniform over the ranges.
+        size: number of points, with those that cannot happen.
     """
 
     Z: Float
@@ -137,6 +145,7 @@ class _Pool:
     points: Float
     road: Float
     even: Float
+    size: int
 
 
 @dataclass(frozen=True)
@@ -218,7 +227,7 @@ class Rate:
         drawn = Draws(
             pool.U[taken],
             pool.Z[taken],
-            pool.road[taken] / (POOL * chances),
+            pool.road[taken] / (pool.size * chances),
             parts,
             np.full(n, share),
             np.full(n, of_batch),
@@ -238,25 +247,27 @@ class Rate:
         best = np.argsort(known.F, kind="stable")[:BEST]
         bases = self.draws.Z[np.union1d(known.distinct[-FOUND:], best)]
         a, b = (POOL_ROAD, POOL_EVEN) if len(bases) else (0.5, 0.5)
-        n_road, n_even = int(a * POOL), int(b * POOL)
+        n_road, n_even, n_near = int(a * POOL), int(b * POOL), 0
         evenly, there = road.even(n_even, rng)
-        Z = [rng.standard_normal((n_road, road.dimensions)), evenly[there]]
+        Z = [road.met(n_road, rng), evenly[there]]
+        share = road.share[1]
         if len(bases):
-            Z.append(near(bases, POOL - n_road - n_even, rng))
-        points = np.concatenate(Z)
+            # Where constraints leave little of the normal space, most points near bases break one.
+            n_near = int((POOL - n_road - n_even) * min(1.0 / share, MORE))
+            Z.append(near(bases, road.continuous, n_near, rng))
+        points, size = np.concatenate(Z), n_road + n_even + n_near
         U, feasible, log_even = road.rows(points)
         points, U, log_even = points[feasible], U[feasible], log_even[feasible]
-        # All densities over the standard normal one, of which a share is feasible.
-        share = road.share[1]
+        # All densities over the road's, which is a standard normal one over its feasible share.
         with np.errstate(over="ignore", invalid="ignore"):
             even = np.exp(log_even)
-            pool = a + b * even / share
+            pool = n_road + n_even * even
             if len(bases):
-                pool = pool + (1.0 - a - b) * density_near(points, bases)
-            of_road, of_even = 1.0 / (share * pool), even / (share * pool)
+                pool = pool + n_near * share * density_near(points, bases, road.continuous)
+            of_road, of_even = size / pool, size * even / pool
         good = np.isfinite(of_even) & (of_road > 0.0)
         points, U = points[good], U[good]
-        return _Pool(points, U, known.columns.points(U), of_road[good], of_even[good])
+        return _Pool(points, U, known.columns.points(U), of_road[good], of_even[good], size)
 
     def _model(self, pool: _Pool) -> _Model:
         """Return what the rows so far say of the points of a pool."""
@@ -323,18 +334,25 @@ def _shared(values: Float) -> Float:
     return shares
 
 
-def near(bases: Float, n: int, random: np.random.Generator) -> Float:
-    """Return n points, each normal score of which is near that of a base, or as on the road."""
+def near(bases: Float, moves: Bool, n: int, random: np.random.Generator) -> Float:
+    """Return n points, each normal score of which is near that of a base, or as on the road.
+
+    Args:
+        bases: ``(k, d)``.
+        moves: ``(d,)``, which scores may be near; the others are as on the road.
+        n: how many.
+        random: all random numbers.
+    """
     base = bases[random.integers(len(bases), size=n)]
     kind = random.integers(len(KEPT), size=n)
-    stays = random.random(base.shape) < np.array(KEPT)[kind, np.newaxis]
+    stays = moves & (random.random(base.shape) < np.array(KEPT)[kind, np.newaxis])
     noise = random.standard_normal(base.shape)
     return np.where(stays, base + np.array(WIDTH)[kind, np.newaxis] * noise, noise)
 
 
-def density_near(Z: Float, bases: Float) -> Float:
+def density_near(Z: Float, bases: Float, moves: Bool) -> Float:
     """Return the density of `near` over the standard normal one, ``(N,)``."""
-    total = np.zeros(len(Z))
+    total, Z, bases = np.zeros(len(Z)), Z[:, moves], bases[:, moves]
     for kept, width in zip(KEPT, WIDTH, strict=True):
         for base in bases:
             steps = (Z - base) / width
