@@ -267,8 +267,8 @@ def known(repeats: int, budget: int) -> None:
     made = problems()
     cases = {
         "half space, 6": lambda: made.linear(6, 2.6), "half space, 4": lambda: made.linear(4, 1.6),
-        "two sides, 4": lambda: made.two_sides(4, 2.4, 2.6), "constrained": made.constrained,
-        "four branches": made.branches, "hidden": made.partly_hidden,
+        "two sides, 4": lambda: made.two_sides(4, 2.4, 2.6),
+        "constrained": made.constrained,
     }  # fmt: skip
     print("| problem | probability | mean / truth, spread | believed | below | above | width |")
     print("|---|---|---|---|---|---|---|")
