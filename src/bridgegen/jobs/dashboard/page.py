@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from bridgegen.assess.criteria import margin_in_words
 from bridgegen.base.disk import write_whole
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.jobs.dashboard.crash_types import TypeStanding
 from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
@@ -695,6 +696,7 @@ def _results(found: Dashboard, base: str) -> Iterator[Table]:
                 "evaluations",
                 "harmful",
                 "of the space",
+                "found of it",
                 "changed (UTC)",
             ),
             [_run(run, base) for run in runs],
@@ -773,6 +775,11 @@ def _run(result: Result, base: str) -> Row:
         result.evaluations,
         "not judged" if result.unjudged else result.failed if space or result.worse_than else "–",
         _span(space.share or 0.0, space.low, space.high) if space and is_known else "–",
+        (
+            "–"
+            if result.covered is None
+            else _span(result.covered[0] / result.covered[1], *clopper_pearson(*result.covered))
+        ),
         when(result.time),
     ]
 

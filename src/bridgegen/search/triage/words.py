@@ -11,14 +11,22 @@ def headline(found: Triage) -> str:
     return found.bound.sentence
 
 
+def covered(found: Triage | None) -> tuple[int, int] | None:
+    """Return how many fresh random failures lie near one that was found, of how many; or None."""
+    if found is None or found.fresh is None or found.fresh.near is None:
+        return None
+    harmful = found.bound.space.harmful
+    return (found.fresh.near, harmful) if harmful and found.bound.harmful else None
+
+
 def covered_in_words(found: Triage) -> str:
-    """Return which share of the fresh random failures lies near one that was found; "" if none."""
-    fresh, harmful = found.fresh, found.bound.space.harmful
-    if fresh is None or fresh.near is None or not harmful or not found.bound.harmful:
+    """Return the share of fresh random failures that lies near one that was found, or ""."""
+    if (counts := covered(found)) is None:
         return ""
-    low, high = clopper_pearson(fresh.near, harmful)
+    near, harmful = counts
+    low, high = clopper_pearson(near, harmful)
     return (
-        f"{fresh.near} of the {harmful} that fail, {percent(fresh.near / harmful)} ({percent(low)} "
+        f"{near} of the {harmful} that fail, {percent(near / harmful)} ({percent(low)} "
         f"to {percent(high)}), lie within {NEAR:g} of a failure found (root mean square of the "
         "searched parameters' shares)"
     )
