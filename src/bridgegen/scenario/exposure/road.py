@@ -73,10 +73,8 @@ class OnRoad:
         try:
             return self._space.encode(X), np.ones(len(X), np.bool_)
         except ScenarioError:  # at the very edge of a constraint, by rounding
-            U, kept = np.full((len(X), self._space.n_var), 0.5), np.zeros(len(X), np.bool_)
-            for k in range(len(X)):
-                try:
-                    U[k], kept[k] = self._space.encode(X[k : k + 1])[0], True
-                except ScenarioError:
-                    continue
-            return U, kept
+            if len(X) == 1:
+                return np.full((1, self._space.n_var), 0.5), np.zeros(1, np.bool_)
+            half = len(X) // 2
+            (U, kept), (others, more) = self._encoded(X[:half]), self._encoded(X[half:])
+            return np.concatenate([U, others]), np.concatenate([kept, more])
