@@ -1,7 +1,7 @@
 """A compact record of one run for a comparison, however long the run is."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +114,6 @@ class Record:
         reached: by k, the evaluations until the k-th critical one; +inf if there is none.
         seconds: [s] that it took.
         seconds_reached: [s] by k, likewise.
-        points: ``(n, k)`` float64, the critical ones, see `normalised`; at most `LIMIT`.
         distinct: how many different critical scenarios it found.
         distinct_reached: by k, the evaluations until the k-th different one; likewise.
         distinct_found: ``(c,)`` int64, different critical scenarios by the c points of its curve.
@@ -128,6 +127,7 @@ class Record:
             point.
         low: ``(m,)`` the least critical value of each term; None where every simulation failed.
         high: ``(m,)`` the most critical one; likewise.
+        points: ``(n, k)`` float64, the critical ones, see `normalised`; at most `LIMIT`.
     """
 
     terms: tuple[str, ...]
@@ -140,7 +140,6 @@ class Record:
     reached: Mapping[int, float]
     seconds: float
     seconds_reached: Mapping[int, float]
-    points: Float
     distinct: int
     distinct_reached: Mapping[int, float]
     distinct_found: Int
@@ -152,6 +151,7 @@ class Record:
     fronts: tuple[Float, ...]
     low: Float | None
     high: Float | None
+    points: Float = field(default_factory=lambda: np.empty((0, 0)))
 
 
 MODE = ("conflict_type", "responsible", "rule", "partner")

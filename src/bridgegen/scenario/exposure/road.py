@@ -8,6 +8,9 @@ from bridgegen.scenario.exposure.exposure import Exposure
 from bridgegen.scenario.exposure.reader import evenly
 from bridgegen.scenario.language.space import SearchSpace
 
+LEAST_KEPT = 0.98
+"""Least share of an exposure's rows that a search can ask for; the others count as not met."""
+
 _TRIED = 256  # rows of which it is tried whether a search can ask for them
 
 
@@ -38,12 +41,16 @@ class OnRoad:
                 f"the exposure says how {', '.join(held)} varies, which this search holds at one "
                 "value: search it, too (--axes, --fix), or leave it out of the exposure"
             )
-        try:
-            space.encode(exposure.sample(_TRIED, 0).X)
-        except ScenarioError as error:
-            raise InputError(
-                f"rows of the exposure cannot be searched: {error.problems[0]} (--exposure)"
-            ) from None
+        X = exposure.sample(_TRIED, 0).X
+        kept = self._encoded(X)[1]
+        if kept.mean() < LEAST_KEPT:
+            try:
+                space.encode(X[~kept])
+            except ScenarioError as error:
+                raise InputError(
+                    f"{kept.mean():.0%} of the exposure's rows can be searched, and at least "
+                    f"{LEAST_KEPT:.0%} must: {error.problems[0]} (--exposure)"
+                ) from None
 
     def rows(self, Z: Float) -> tuple[Float, Bool, Float]:
         """See `bridgegen.search.algorithms.Road`."""

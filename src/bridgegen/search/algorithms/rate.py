@@ -176,9 +176,9 @@ class Rate:
         "growth": Setting(
             0.2, "rows per batch at least, as a share of the critical ones known", 0.0, 1.0
         ),
-        "road": Setting(0.15, "share of the rows that are drawn as on the road", 0.01, 0.5),
-        "even": Setting(0.1, "share of the rows that are uniform over the ranges", 0.0, 0.25),
-        "rate": Setting(0.3, "share of the rows that make the rate precise", 0.0, 0.5),
+        "road": Setting(0.25, "share of the rows that are drawn as on the road", 0.01, 0.5),
+        "even": Setting(0.05, "share of the rows that are uniform over the ranges", 0.0, 0.25),
+        "rate": Setting(0.25, "share of the rows that make the rate precise", 0.0, 0.5),
         "apart": Setting(
             0.1,
             "distance kept from critical rows, as a share of the ranges, in root mean square",
