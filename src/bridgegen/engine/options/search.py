@@ -361,8 +361,7 @@ class SearchOptions(CommonOptions):
         default=False,
         metadata=option(
             FLAG,
-            "Also estimate how likely harm and each failure mode is: every row is drawn with a "
-            "known chance (the algorithm rate).",
+            "Also estimate how likely harm and each failure mode is.",
             before=False,
             group=SEARCH,
         ),

@@ -65,6 +65,9 @@ LIKELY = 7
 """Number of ten seeking rows that are likely critical, once a critical row is known."""
 
 
+SURE = 4.0
+"""Power of the likelihood of harm by which half of the rows for the rate are drawn."""
+
 DOUBT = 1.25
 """By what deviations of a model are divided: models of a few hundred rows are too certain."""
 
@@ -211,7 +214,11 @@ class Rate:
         stated, base = as_road + evenly, blind
         if model and model.likely is not None:
             stated += values["rate"]
-            base = blind + values["rate"] * _shared(pool.road * model.likely)
+            # Where harm is rare, what is hardly likely outweighs it on the road: half of these rows
+            # go where it is likely in any case.
+            for power in (1.0, SURE):
+                weights = pool.road * model.likely**power
+                base = base + 0.5 * values["rate"] * _shared(weights)
         taken: list[int] = []
         chances, parts = np.empty(n), np.empty(n)
         for k in range(n):
