@@ -172,7 +172,10 @@ class Rate:
 
     name: ClassVar[str] = "rate"
     description: ClassVar[str] = "new failures by a model, each row with a known chance, for rates"
-    source: ClassVar[str] = "Mei et al. (2024), arXiv:2411.17826; Owen and Zhou (2000)"
+    source: ClassVar[str] = (
+        "Mei et al. (2024), arXiv:2411.17826; Owen and Zhou (2000), "
+        "doi:10.1080/01621459.2000.10473909"
+    )
     settings: ClassVar[Mapping[str, Setting]] = {
         "initial": Setting(40, "number of initial rows", 2, 100_000),
         "batch": Setting(10, "rows per batch, at least", 1, 10_000),
