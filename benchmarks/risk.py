@@ -2,11 +2,15 @@
 
 python benchmarks/risk.py coverage [--repeats 400] [--budget 60000] [METHOD …]
 python benchmarks/risk.py scenarios FOLDER [--pairs SCENARIO/DRIVER …]
+python benchmarks/risk.py rate FOLDER [--pairs SCENARIO/DRIVER …] [--seeds 3] [--budget 1000]
+python benchmarks/risk.py known [--repeats 200] [--budget 600]
 
 ``coverage``: on the analytic problems of the tests, whose probability is known. ``scenarios``: of
 catalogue scenarios, with exposures under which harm is rare. The truth is counted without any
 estimator: rows that are uniform over the ranges are simulated, and the harmful ones weighted by how
-likely they are. Stopped and started again, it goes on.
+likely they are. ``rate``: failures and rates from one budget (``search --rate``) in the same cases,
+beside a search without rates, and Monte Carlo of the same budget. ``known``: how often intervals of
+``search --rate`` hold a truth that is known. Stopped and started again, it goes on.
 """
 
 import argparse
@@ -15,23 +19,32 @@ import json
 import sys
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
 from bridgegen.assess.conflict.harm import NEAR_MISS
+from bridgegen.base.statistics import clopper_pearson
+from bridgegen.jobs.compare.record import distinct, normalised, space_of
 from bridgegen.jobs.risk.estimators.problem import Aim
 from bridgegen.jobs.risk.estimators.weighted import Probability, of_weights
 from bridgegen.jobs.risk.experiment import estimate
 from bridgegen.jobs.risk.result import Risk
 from bridgegen.jobs.risk.risk import estimate_risk
+from bridgegen.jobs.search import Run, run_search
 from bridgegen.jobs.search.scenarios import load
+from bridgegen.results.store import Store
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.scenario.exposure.reader import UNIFORM, build_exposure
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.search.algorithms.algorithm import Problem, Results
+from bridgegen.search.algorithms.rate import Rate
+from bridgegen.search.triage.rates import Drawn, how_likely
+from bridgegen.search.triage.record import Frequency
 
 TESTS = Path(__file__).parents[1] / "tests/risk/estimators/problems.py"
 
@@ -93,6 +106,21 @@ def problems() -> ModuleType:
     return module
 
 
+def of_rate(problem: Any, seed: int, budget: int) -> Frequency:
+    """Return what a search with rates says of an analytic problem."""
+    road = problems().AnalyticRoad(problem)
+    names = tuple(f"x{k}" for k in range(problem.dimensions))
+    algorithm = Rate(Problem(names, road=road), seed)
+    score = np.empty(0)
+    while len(score) < budget:
+        U = algorithm.ask()
+        found = problem.score(road.normal(U))
+        algorithm.tell(U, replace(Results.of_F(-found[:, np.newaxis]), critical=found >= 0.0))
+        score = np.concatenate([score, found])
+    drawn = Drawn(algorithm.draws.take(budget), np.arange(budget), problem.share, "")
+    return how_likely(drawn, score[:budget] >= 0.0)
+
+
 def coverage(repeats: int, budget: int, methods: list[str]) -> None:
     """Print how often intervals hold the truth, and estimates, of the results that are believed."""
     made = problems()
@@ -131,6 +159,21 @@ def coverage(repeats: int, budget: int, methods: list[str]) -> None:
 def made_up(case: Case) -> Exposure:
     """Return the exposure of a case."""
     scenario = load(case.scenario)
+    text = json.dumps(node(case)).encode()
+    return build_exposure(read_plain_yaml(text, "made up"), scenario, None)
+
+
+def truth(counted: Risk, wanted: Exposure) -> Probability:
+    """Return the probability under an exposure, of rows that were drawn from another one."""
+    rows = counted.weighted
+    X = counted.exposure.from_normal(rows.Z[rows.there(NEAR_MISS) > 0.0])
+    likelier = np.exp(wanted.log_density(X) - counted.exposure.log_density(X))
+    return of_weights(likelier / rows.rows)
+
+
+def node(case: Case) -> dict[str, object]:
+    """Return the exposure of a case as its file has it."""
+    scenario = load(case.scenario)
     assert isinstance(scenario, LogicalScenario)
     normal = {}
     for name, mean in case.means.items():
@@ -140,16 +183,7 @@ def made_up(case: Case) -> Exposure:
             "distribution": "normal", "mean": one.low + mean * size,
             "deviation": case.deviation * size,
         }  # fmt: skip
-    node = {"source": "Made up for this benchmark.", "others": "uniform", "parameters": normal}
-    return build_exposure(read_plain_yaml(json.dumps(node).encode(), "made up"), scenario, None)
-
-
-def truth(counted: Risk, wanted: Exposure) -> Probability:
-    """Return the probability under an exposure, of rows that were drawn from another one."""
-    rows = counted.weighted
-    X = counted.exposure.from_normal(rows.Z[rows.there(NEAR_MISS) > 0.0])
-    likelier = np.exp(wanted.log_density(X) - counted.exposure.log_density(X))
-    return of_weights(likelier / rows.rows)
+    return {"source": "Made up for this benchmark.", "others": "uniform", "parameters": normal}
 
 
 def scenarios(folder: Path, pairs: list[str]) -> None:
@@ -188,6 +222,77 @@ def scenarios(folder: Path, pairs: list[str]) -> None:
             print(f"| {' | '.join(cells)} |", flush=True)
 
 
+def rates(folder: Path, pairs: list[str], seeds: int, budget: int) -> None:
+    """Print failures and intervals of one budget, beside those of a search and of Monte Carlo."""
+    print(
+        "| scenario | driver | seed | P(harm) | 95 % | Monte Carlo's width | failures | distinct |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
+    for case in CASES:
+        if pairs and f"{case.scenario}/{case.driver}" not in pairs:
+            continue
+        there = folder / f"{case.scenario}-{case.driver}"
+        there.mkdir(parents=True, exist_ok=True)
+        (file := there / "exposure.yaml").write_text(
+            json.dumps({"exposure_of": case.scenario, "exposure": node(case)})
+        )
+        for seed in range(seeds):
+            cells = [case.scenario, case.driver, str(seed)]
+            counts = []
+            for name, more in (("rate", {"exposure": file}), ("search", {})):
+                if not (out := there / f"{name}-{seed}").exists():
+                    run_search(
+                        case.scenario, ego=case.driver, objective={"harm": 1.0}, budget=budget,
+                        seed=seed, triage="none", keep=0, out=out, **more,
+                    )  # fmt: skip
+                run, space = Run(out), space_of(out)
+                with Store.open(out) as store:
+                    rows = store.read()
+                at = np.flatnonzero(rows.critical)
+                new = distinct(normalised(space, rows.X[at]), n_var=space.n_var)
+                counts.append((len(at), int(new.sum())))
+                if run.triage is not None and run.triage.rate is not None:
+                    p = run.triage.rate.harm
+                    low, high = clopper_pearson(round(budget * (p.estimate or 0.0)), budget)
+                    cells += [
+                        "in doubt" if p.estimate is None else f"{p.estimate:.2g}",
+                        f"{p.low:.2g} to {p.high:.2g}", f"{high - low:.2g}",
+                    ]  # fmt: skip
+            cells += [" / ".join(str(count[k]) for count in counts) for k in range(2)]
+            print(f"| {' | '.join(cells)} |", flush=True)
+
+
+def known(repeats: int, budget: int) -> None:
+    """Print how often intervals of ``search --rate`` hold the truth, on analytic problems."""
+    made = problems()
+    cases = {
+        "half space, 6": lambda: made.linear(6, 2.6), "half space, 4": lambda: made.linear(4, 1.6),
+        "two sides, 4": lambda: made.two_sides(4, 2.4, 2.6),
+        "constrained": made.constrained,
+    }  # fmt: skip
+    print("| problem | probability | mean / truth, spread | believed | below | above | width |")
+    print("|---|---|---|---|---|---|---|")
+    for name, make in cases.items():
+        problem, ratios, sides, widths = make(), [], [], []
+        p = problem.probability
+        for seed in range(repeats):
+            found = of_rate(problem, seed, budget)
+            if found.estimate is not None:
+                ratios.append(found.estimate / p)
+                sides.append((found.high < p, found.low > p))
+                widths.append(found.high - found.low)
+            else:
+                sides.append((found.high < p, False))
+        below, above = np.mean(sides, axis=0)
+        low, high = clopper_pearson(budget * p, budget)
+        width = np.median(widths) / (high - low) if widths else np.nan
+        print(
+            f"| {name} | {p:.3g} | {np.mean(ratios):.2f}, {np.std(ratios):.2f} | {len(ratios)} of "
+            f"{repeats} | {below:.1%} | {above:.1%} | {width:.2f} |",
+            flush=True,
+        )
+
+
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -196,12 +301,24 @@ def main() -> None:
     one.add_argument("methods", nargs="*", default=["mc", "subset", "importance", "stratified"])
     one.add_argument("--repeats", type=int, default=400)
     one.add_argument("--budget", type=int, default=60_000)
+    both = parts.add_parser("rate")
+    both.add_argument("folder", type=Path)
+    both.add_argument("--pairs", nargs="*", default=[])
+    both.add_argument("--seeds", type=int, default=3)
+    both.add_argument("--budget", type=int, default=1000)
+    sure = parts.add_parser("known")
+    sure.add_argument("--repeats", type=int, default=200)
+    sure.add_argument("--budget", type=int, default=600)
     other = parts.add_parser("scenarios")
     other.add_argument("folder", type=Path)
     other.add_argument("--pairs", nargs="*", default=[])
     given = parser.parse_args()
     if given.what == "coverage":
         coverage(given.repeats, given.budget, given.methods)
+    elif given.what == "rate":
+        rates(given.folder, given.pairs, given.seeds, given.budget)
+    elif given.what == "known":
+        known(given.repeats, given.budget)
     else:
         scenarios(given.folder, given.pairs)
 

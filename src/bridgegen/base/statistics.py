@@ -45,6 +45,44 @@ def clopper_pearson(
     return low, high
 
 
+def weighted_counts(parts: Float) -> tuple[float, float, float, float]:
+    """Return the interval of a sum of weights of hits, each of which happens or not.
+
+    Args:
+        parts: ``(M,)`` the weights of the hits, of which there is at least one.
+
+    Returns:
+        The sum, the ends of its 95 % interval, and its one-sided upper bound.
+
+    Source: Fay and Feuer, Statistics in Medicine 16 (1997) 791-801, with the mid-P correction of
+    Fay and Kim, Biometrical Journal 59 (2017) 1174-1186.
+    """
+    import scipy.optimize
+    import scipy.special
+
+    largest = float(parts.max())
+    total, square = float(parts.sum()), float(np.sum(parts * parts))
+    more, more_square = total + largest, square + largest * largest
+
+    def below(value: float) -> float:
+        """Return the mid-P confidence that the mean is below a value."""
+        lower = scipy.special.gammainc(total * total / square, value * total / square)
+        upper = scipy.special.gammainc(more * more / more_square, value * more / more_square)
+        return float(0.5 * (lower + upper))
+
+    def quantile(confidence: float) -> float:
+        end = more
+        # Doubled until the root lies between the ends: brentq needs a change of sign.
+        while below(end) < confidence:
+            end *= 2.0
+        return float(
+            scipy.optimize.brentq(lambda x: below(x) - confidence, 0.0, end, xtol=1e-9 * more)
+        )
+
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    return total, quantile(tail), quantile(1.0 - tail), quantile(CONFIDENCE)
+
+
 def wilson(successes: int, trials: int) -> tuple[float, float]:
     """Return an interval that contains a probability with about 95 % confidence; fast.
 

@@ -9,7 +9,7 @@ from bridgegen.pages.playback import Conflict
 from bridgegen.search.triage.influence import ends_in_words
 from bridgegen.search.triage.judgement import judgement
 from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
-from bridgegen.search.triage.words import step_in_words, steps_in_words
+from bridgegen.search.triage.words import covered_in_words, step_in_words, steps_in_words
 
 FINDING_FIELDS = ("conflict", "conflict_type", "responsible", "rule", "partner")
 """The fields of a row's finding, in the page's order."""
@@ -100,6 +100,8 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "steps": steps_in_words(found),
         "missed": found.missed,
         "extrapolated": found.extrapolated,
+        "covered": covered_in_words(found),
+        **({"rate": found.rate.sentence} if found.rate else {}),
         "judged": _judged(found),
         "bound": {
             "sentence": found.bound.in_full,
@@ -127,7 +129,7 @@ def _mode(mode: Mode, tested: Neighbourhood | None) -> dict[str, Any]:
         include={
             "number", "title", "conflict", "conflict_type", "responsible", "rule", "partner",
             "place", "cause", "judgement", "tested", "count", "harm", "severity", "shown", "worst",
-            "robustness", "space",
+            "robustness", "space", *(["probability"] if mode.probability else []),
         }
     )  # fmt: skip
     return facts | {

@@ -174,3 +174,33 @@ def noisy():
 
     half = normal.sf(3.5)
     return Analytic(3, score, half + 1e-4 * (1.0 - half))
+
+
+class AnalyticRoad:
+    """A problem in the unit cube of a search, which holds normal scores of −4 to 4."""
+
+    def __init__(self, problem):
+        self.problem, self.dimensions, self.share = problem, problem.dimensions, problem.share
+        self.continuous = np.ones(self.dimensions, np.bool_)
+
+    def normal(self, U):
+        return 8.0 * U - 4.0
+
+    def rows(self, Z):
+        inside = (np.abs(Z) < 4.0).all(axis=1)
+        density = normal.logpdf(Z).sum(axis=1) - np.log(self.share[1])
+        log_even = np.log(self.even_share) - self.dimensions * np.log(8.0) - density
+        return np.clip((Z + 4.0) / 8.0, 0.0, 1.0), inside & self.problem.feasible(Z), log_even
+
+    @property
+    def even_share(self):
+        """One over the share of the cube that is feasible: rows of `even` are uniform in it."""
+        return 1.0 / self.share[1]
+
+    def met(self, n, random):
+        Z = random.standard_normal((8 * n + 100, self.dimensions))
+        return Z[self.problem.feasible(Z)][:n]
+
+    def even(self, n, random):
+        Z = 8.0 * random.random((4 * n, self.dimensions)) - 4.0
+        return Z[self.problem.feasible(Z)][:n], np.ones(n, np.bool_)

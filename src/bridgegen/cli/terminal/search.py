@@ -226,26 +226,35 @@ def _mode_lines(found: "Triage") -> list[str]:
 
     modes = found.modes[:MOST_MODES]
     most = max((mode.count for mode in modes), default=1)
-    lines = ["         count  event · rule · worst MAIS3+ · root cause"] if modes else []
+    likely = "probability · " if found.rate else ""
+    lines = [f"         count  event · {likely}rule · worst MAIS3+ · root cause"] if modes else []
     for mode in modes:
         bar = "█" * max(round(BAR * mode.count / most), 1)
         what, _, _ = mode.title.partition(" (")
         worst = percent(mode.severity) if mode.conflict == "contact" else mode.conflict
         hangs = "step-dependent" if step_in_words(mode, found) else ""
-        about = " · ".join(filter(None, [mode.rule, worst, mode.cause, hangs]))
+        likely = f"P {mode.probability.sentence}" if mode.probability else ""
+        about = " · ".join(filter(None, [likely, mode.rule, worst, mode.cause, hangs]))
         head = f"{mode.number:>2} {bar:<{BAR}} {mode.count:>5,}  "
-        room = max(WIDTH - len(head) - len(about) - 3, 12)
+        width = WIDTH + len(likely)
+        room = max(width - len(head) - len(about) - 3, 12)
         short = what if len(what) <= room else f"{what[: room - 1]}…"
-        lines.append(f"{head}{short} · {about}"[:WIDTH])
+        lines.append(f"{head}{short} · {about}"[:width])
     more = len(found.modes[MOST_MODES:]) + found.unrecorded_modes
     return [*lines, f"    and {more} more"] if more else lines
 
 
 def _found_lines(found: "Triage") -> list[str]:
     """Return how common failures are, the simplest one, what matters, and what does not count."""
-    from bridgegen.search.triage.words import parameters_in_words, steps_in_words
+    from bridgegen.search.triage.words import (
+        covered_in_words,
+        parameters_in_words,
+        steps_in_words,
+    )
 
-    space, lines = found.bound.space, []
+    space, lines = found.bound.space, list[str]()
+    if found.rate is not None:
+        lines.append(f"How likely: {found.rate.sentence}")
     if found.bound.judged and space.drawn and space.rows:
         share = (
             f"{percent(space.share or 0.0)} of random scenarios fail ({percent(space.low)} to "
@@ -254,6 +263,8 @@ def _found_lines(found: "Triage") -> list[str]:
             else f"at most {percent(space.high)} of random scenarios fail"
         )
         lines.append(f"How common: {share}; {space.measure}, 95 % confidence; not a rate on roads")
+        if covered := covered_in_words(found):
+            lines.append(f"Found of it: of {space.rows} random scenarios, {covered}")
     simplest = [mode.minimal for mode in found.modes if mode.minimal is not None]
     if simplest:
         lines.append(f"Simplest: {simplest[0].sentence}")

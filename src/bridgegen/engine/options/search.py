@@ -357,6 +357,26 @@ class SearchOptions(CommonOptions):
             names="setting",
         ),
     )
+    rate: bool = field(
+        default=False,
+        metadata=option(
+            FLAG,
+            "Also estimate how likely harm and each failure mode is.",
+            before=False,
+            group=SEARCH,
+        ),
+    )
+    exposure: Path | str | None = field(
+        default=None,
+        metadata=option(
+            PATH,
+            "How parameters are distributed on the road, for --rate, which it implies: a file "
+            "(.yaml), an example of 'bridgegen list exposures', or uniform.",
+            shown="the scenario's; without one, the ranges",
+            before=None,
+            group=SEARCH,
+        ),
+    )
     budget: int | None = field(
         default=None,
         metadata=option(

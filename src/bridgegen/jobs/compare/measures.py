@@ -9,8 +9,12 @@ import numpy as np
 from bridgegen.base.arrays import Float
 from bridgegen.base.statistics import quartiles
 from bridgegen.jobs.compare.fronts import Scale, front, generational_distance, hypervolume, spread
+from bridgegen.jobs.compare.options import APART
 from bridgegen.jobs.compare.plan import Cell
 from bridgegen.jobs.compare.record import DISTINCT, MODES, Record
+
+RANDOM = "random"
+"""The algorithm whose scenarios are drawn from the space without regard to results."""
 
 SHARE = 0.05
 """Share of the budget that must be critical for T_critic: 50 evaluations of 1000."""
@@ -57,6 +61,10 @@ def measures(budget: int) -> tuple[Measure, ...]:
             "rule, partner", True,
         ),
         Measure("distinct", "distinct", "different critical scenarios", True),
+        Measure(
+            "covered", "covered", "share of the critical scenarios of random search, with other "
+            "seeds, that differ from no critical one found", True, digits=3,
+        ),
         Measure("to_1", "to 1st", "evaluations until the 1st critical scenario", False),
         Measure(
             f"to_{DISTINCT}_distinct", f"to {DISTINCT} distinct",
@@ -135,7 +143,9 @@ def others(records: Mapping[Cell, Record], baseline: str) -> set[str]:
     return {cell.algorithm for cell, record in records.items() if record.parameters != usual}
 
 
-def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measured:
+def measure(
+    records: Mapping[Cell, Record], budget: int, baseline: str, apart: float = APART
+) -> Measured:
     """Measure the runs of one scenario, at least one.
 
     Bins and differences of parameters are not defined (NaN) for algorithms that search other
@@ -171,6 +181,9 @@ def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measu
                 if cell.algorithm in strange
                 else _in_parameters(record)
             ),
+            "covered": float("nan")
+            if cell.algorithm in strange
+            else _covered(cell, records, apart),
             "hypervolume": float(curves[cell][-1]),
             "gd": generational_distance(final[cell], reference),
             "spread": spread(final[cell], reference),
@@ -181,6 +194,28 @@ def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measu
         for cell, record in records.items()
     }
     return Measured(values, curves, scale, reference)
+
+
+def _covered(cell: Cell, records: Mapping[Cell, Record], apart: float) -> float:
+    """Return the share of critical random scenarios that lie near one that a run found.
+
+    The random scenarios are those of random search with other seeds; NaN without any.
+    """
+    from scipy.spatial import cKDTree
+
+    drawn = [
+        record.points
+        for other, record in records.items()
+        if other.algorithm == RANDOM and other.seed != cell.seed
+    ]
+    fresh, own = np.concatenate(drawn) if drawn else np.empty((0, 0)), records[cell]
+    if not fresh.size:
+        return float("nan")
+    if not own.points.size:
+        return 0.0
+    least = apart * np.sqrt(len(own.parameters))
+    off, _ = cKDTree(own.points).query(fresh, distance_upper_bound=least)
+    return float(np.mean(off < least))
 
 
 def _in_parameters(record: Record) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """A compact record of one run for a comparison, however long the run is."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -127,6 +127,7 @@ class Record:
             point.
         low: ``(m,)`` the least critical value of each term; None where every simulation failed.
         high: ``(m,)`` the most critical one; likewise.
+        points: ``(n, k)`` float64, the critical ones, see `normalised`; at most `LIMIT`.
     """
 
     terms: tuple[str, ...]
@@ -150,6 +151,7 @@ class Record:
     fronts: tuple[Float, ...]
     low: Float | None
     high: Float | None
+    points: Float = field(default_factory=lambda: np.empty((0, 0)))
 
 
 MODE = ("conflict_type", "responsible", "rule", "partner")
@@ -218,7 +220,8 @@ def read(
     n = len(critical)
     # A greedy net in the run's own order. Single linkage forms chains: of 1,000 random rows of S4
     # it makes 8 clusters where the net counts 241.
-    is_new = distinct(normalised(space, critical), apart, n_var=space.n_var)
+    where = normalised(space, critical)
+    is_new = distinct(where, apart, n_var=space.n_var)
     new_at = [reader.hits[k][0] for k in np.flatnonzero(is_new).tolist()]
     bins = coverage(space, critical, np.ones(n, np.bool_), strength=2, sample=0).ways
     hits = reader.hits
@@ -235,6 +238,7 @@ def read(
         reached={k: float(hits[k - 1][0]) if k <= n else float("inf") for k in ks},
         seconds=seconds,
         seconds_reached={k: hits[k - 1][1] if k <= n else float("inf") for k in ks},
+        points=where[:LIMIT],
         distinct=len(new_at),
         distinct_reached={DISTINCT: _reached(new_at, DISTINCT)},
         distinct_found=np.searchsorted(new_at, points(budget), side="right").astype(np.int64),

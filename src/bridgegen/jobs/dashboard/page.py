@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from bridgegen.assess.criteria import margin_in_words
 from bridgegen.base.disk import write_whole
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.jobs.dashboard.crash_types import TypeStanding
 from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
@@ -680,7 +681,7 @@ def _results(found: Dashboard, base: str) -> Iterator[Table]:
     runs = sorted(project.runs, key=lambda run: (-run.time, run.source))
     suites = sorted(project.suites, key=lambda suite: (-suite.time, suite.source))
     compared = [suite for suite in suites if suite.difference]
-    heads = "run, scenario, driver, evaluations, harmful, of the space, changed (UTC)"
+    heads = "run, scenario, driver, evaluations, harmful, of the space, found of it, changed (UTC)"
     yield _of(runs, ("run",), heads, (_run(run, base) for run in runs))
     heads = "suite, drivers, scenarios, not judged, variations, fail, not run, changed (UTC)"
     yield _of(suites, ("suite",), heads, (_suite(suite, base) for suite in suites))
@@ -723,6 +724,11 @@ def _run(result: Result, base: str) -> Row:
         result.evaluations,
         "not judged" if result.unjudged else result.failed if space or result.worse_than else "–",
         _span(space.share or 0.0, space.low, space.high) if space and is_known else "–",
+        (
+            "–"
+            if result.covered is None
+            else _span(result.covered[0] / result.covered[1], *clopper_pearson(*result.covered))
+        ),
         when(result.time),
     ]
 

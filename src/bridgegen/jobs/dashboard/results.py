@@ -254,6 +254,8 @@ class Result:
         worse_than: the driver that a difference is of, as people call it; else "".
         unjudged: whether it says nothing of the driver, see
             `bridgegen.search.triage.record.Bound.judged`.
+        covered: how many fresh random failures lie near one that was found, and of how many; None
+            where it is not known.
     """
 
     kind: Kind
@@ -274,6 +276,7 @@ class Result:
     ego: str = ""
     worse_than: str = ""
     unjudged: bool = False
+    covered: tuple[int, int] | None = None
 
 
 def in_order(results: Iterable[Result]) -> list[Result]:

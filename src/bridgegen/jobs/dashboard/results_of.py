@@ -47,6 +47,7 @@ from bridgegen.results.store import Store
 from bridgegen.scenario.language.criteria import read_criterion
 from bridgegen.search.triage.modes import Key, title
 from bridgegen.search.triage.record import Mode
+from bridgegen.search.triage.words import covered
 
 # --- A run's folder → a result ---
 
@@ -102,6 +103,7 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries, odd: ProjectOdd)
         seen[0],
         worse_than="" if other is None else driver_of(other, project, line.version).label,
         unjudged=bound is not None and not bound.judged,
+        covered=covered(line.triage),
     )
 
 

@@ -44,7 +44,12 @@ from bridgegen.jobs.search.scenarios import (
     within,
 )
 from bridgegen.jobs.search.screening import BATCH, require_screen, screen_budget
-from bridgegen.jobs.search.searcher import FailingDriver, require_asynchronous, searcher_of
+from bridgegen.jobs.search.searcher import (
+    FailingDriver,
+    drawn_of,
+    require_asynchronous,
+    searcher_of,
+)
 from bridgegen.jobs.search.settings import Settings
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.opendrive.site_adapted import adapted
@@ -57,7 +62,7 @@ from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
 from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Problem, resolve
-from bridgegen.search.algorithms.automatic import AUTO, automatic
+from bridgegen.search.algorithms.automatic import AUTO, RATE, automatic
 from bridgegen.search.triage.effort import effort
 from bridgegen.search.triage.fresh import failing_draws
 from bridgegen.search.triage.record import write_record
@@ -199,6 +204,7 @@ def run_search(given: SearchArguments) -> Run:
             given,
             scenario=_absolute(given.scenario) if is_file(given.scenario) else str(given.scenario),
             distribution=_absolute(given.distribution),
+            exposure=_absolute(given.exposure) if is_file(given.exposure or "") else given.exposure,
             fingerprint=catalogue.fingerprint,
             algorithm=given.algorithm,
             settings=values,
@@ -344,7 +350,7 @@ def _go(
     if not deliver:
         return Run.of(store)
     try:
-        return _finish(pipeline, store, settings, callbacks)
+        return _finish(pipeline, algorithm, store, settings, callbacks)
     except KeyboardInterrupt:
         store.require_there()
         raise Interrupted(store.folder, result.evaluations, settings.budget) from None
@@ -367,7 +373,11 @@ def _workers_lost(error: WorkersError, store: Store) -> WorkersError:
 
 
 def _finish(
-    pipeline: Pipeline, store: Store, settings: Settings, callbacks: SearchCallbacks
+    pipeline: Pipeline,
+    algorithm: toolkit.Algorithm,
+    store: Store,
+    settings: Settings,
+    callbacks: SearchCallbacks,
 ) -> Run:
     """Triage the results, export the most critical scenarios, and write the report."""
     callbacks.stage("triage")
@@ -386,6 +396,7 @@ def _finish(
             chosen=best.tolist() if rule == "criteria" else None,
             effort=effort(settings.triage),
             domain=store.domain,
+            drawn=drawn_of(algorithm, pipeline, settings, store) if settings.rate else None,
         )
         if rule != "criteria":
             best = np.array(triaged.exports, dtype=np.int64)
@@ -436,6 +447,17 @@ def _with_algorithm(
     given: SearchArguments, scenario: SearchedScenario, budget: int
 ) -> SearchArguments:
     """Return options that name the algorithm; where they say `AUTO`, the one that it is."""
+    if given.rate or given.exposure is not None:
+        if given.algorithm not in (AUTO, RATE):
+            raise InputError(
+                f"--rate estimates by rows that the algorithm {RATE} draws, got {given.algorithm} "
+                "(--algorithm)"
+            )
+        given = replace(given, algorithm=RATE)
+    if given.algorithm == RATE:
+        if given.screen is not None:
+            raise InputError("--rate draws rows of the simulator itself: leave out --screen")
+        return replace(given, rate=True)
     if given.algorithm != AUTO:
         return given
     name = automatic(

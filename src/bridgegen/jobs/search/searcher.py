@@ -9,14 +9,20 @@ import numpy.typing as npt
 from bridgegen.base.errors import InputError
 from bridgegen.engine.options import SearchOptions
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search.known_rows import KnownRows, ResultLog
 from bridgegen.jobs.search.loop import Progress
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.screening import Screen, screen_of
 from bridgegen.jobs.search.settings import Settings
 from bridgegen.results.store import Store
+from bridgegen.scenario.exposure import Exposure
+from bridgegen.scenario.exposure.reader import chosen_exposure
+from bridgegen.scenario.exposure.road import OnRoad
 from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Arena, Problem, asynchronous, resolve
+from bridgegen.search.algorithms.rate import Rate
 from bridgegen.search.screened import Screened
+from bridgegen.search.triage.rates import Drawn
 from bridgegen.simulation.rollout import FAILURES, STATUS_MESSAGES
 
 
@@ -66,9 +72,53 @@ def require_asynchronous(given: SearchOptions, algorithm: type[toolkit.Algorithm
         )
 
 
-def _problem(pipeline: Pipeline, arena: Arena | None = None) -> Problem:
+def drawn_of(
+    algorithm: toolkit.Algorithm, pipeline: Pipeline, settings: Settings, store: Store
+) -> Drawn:
+    """Return the rows of a finished run as they were drawn, with their chances.
+
+    Args:
+        algorithm: that searched; if it was not asked for all rows, since the run had been resumed
+            from its end, another one is.
+        pipeline: of the run.
+        settings: of the run, which is one with rates.
+        store: of the run.
+    """
+    assert isinstance(algorithm, Rate)
+    log, n = ResultLog(store.n_obj, len(store.metrics)), len(store)
+    for rows in store.rows():
+        log.add(rows)
+    again, known = not len(algorithm.draws.U), KnownRows()
+    ids = np.empty(0, np.int64)
+    while True:
+        if again:
+            U = algorithm.ask()
+        X = pipeline.space.decode(algorithm.draws.U[len(ids) :]) + 0.0
+        more, _ = known.add(X, n)
+        ids = np.concatenate([ids, more])
+        if not again or len(known) >= n:
+            break
+        algorithm.tell(U, log.results(more))
+    over = np.flatnonzero(ids < 0)  # the budget ends within a batch
+    last = int(over[0]) if len(over) else len(ids)
+    met = _met(pipeline, settings)
+    road = OnRoad(met, pipeline.space).share if met else (1.0, 1.0, 1.0)
+    source = met.source if met else ""
+    return Drawn(algorithm.draws.take(last), ids[:last], road, source)
+
+
+def _met(pipeline: Pipeline, settings: Settings) -> Exposure | None:
+    """Return the exposure of a run with rates, if there is one."""
+    scenario = pipeline.scenario
+    return chosen_exposure(scenario, settings.exposure) if settings.rate else None
+
+
+def _problem(
+    pipeline: Pipeline, arena: Arena | None = None, met: Exposure | None = None
+) -> Problem:
     space, n_obj = pipeline.space, pipeline.objective.n_obj
-    return Problem(space.variables, pipeline.metrics, n_obj, arena, space.levels)
+    road = None if met is None else OnRoad(met, space)
+    return Problem(space.variables, pipeline.metrics, n_obj, arena, space.levels, road)
 
 
 def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
@@ -77,7 +127,7 @@ def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
     arena = pipeline.arena() if getattr(method, "is_adversary", False) else None
     if arena is not None:
         arena.warm_up()
-    problem = _problem(pipeline, arena)
+    problem = _problem(pipeline, arena, _met(pipeline, settings))
     values = resolve(method, problem, settings.seed, settings.settings)
     return method(problem, settings.seed, **values)
 

@@ -86,6 +86,8 @@ class Settings(SearchOptions):
             del plain["own_metrics"]  # as in runs of earlier versions
         if self.odd is None:
             del plain["odd"]
+        if not self.rate:
+            del plain["rate"], plain["exposure"]
         chosen = {name: plain.pop(name) for name in CHOSEN}
         plain["simulator_settings"] = dict(self.simulator.settings)
         plain["simulator"] = self.simulator.name

@@ -40,9 +40,10 @@ class Modes {
     this.buttons = [];
     $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)), ...drawn.map((kept, k) => this.draw(kept, k)));
     $("modes-list").hidden = !n && !drawn.length;
-    const notes = [], nearest = nearestToHarm();
+    const notes = found.rate ? [`${found.rate}.`] : [], nearest = nearestToHarm();
     if (nearest !== null && !anyViolated()) notes.push(`Evaluation ${number(nearest + 1)}, which came nearest to harm, is shown below.`);
     if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
+    if (found.covered) notes.push(`Found of what fails: of fresh random scenarios, ${found.covered}.`);
     if (found.influences.length) notes.push(`What matters most: ${found.influences.slice(0, 3).map(({ name }) => name).join(", ")}.`);
     if (found.steps) notes.push(`${capital(found.steps)}.`);
     if (found.extrapolated) notes.push(`Extrapolated: ${found.extrapolated}.`);
@@ -57,6 +58,7 @@ class Modes {
   card(mode) {
     const fact = (strong, text, title = "") => element("li", { title }, element("b", {}, strong), ` ${text}`);
     const share = mode.space.share === null ? [] : [fact(shareText(mode.space.share), `of the space (95${NARROW}%: ${shareText(mode.space.low)} to ${shareText(mode.space.high)})`, `${mode.space.harmful} of ${mode.space.rows} ${mode.space.drawn} scenarios`)];
+    const { probability: p } = mode, often = p ? [fact(p.estimate ? p.estimate.toPrecision(2) : `< ${p.high.toPrecision(2)}`, p.estimate ? `probability (95${NARROW}%: ${p.low.toPrecision(2)} to ${p.high.toPrecision(2)})` : "probability", p.doubt)] : [];
     const robust = mode.robustness === null ? fact("not tested", "for robustness") : fact(`${mode.harmful} of ${mode.rows}`, "neighbours harmful", "robustness");
     const severity = mode.severity > 0 ? [fact(shareText(mode.severity), "worst severity", "highest probability of a MAIS3+ injury")] : [];
     const exported = data.kept.find(({ evaluation }) => evaluation === mode.shown), picture = exported && glyph(exported);
@@ -87,7 +89,7 @@ class Modes {
         element("span", { class: "mode-number", "aria-hidden": "true" }, `${mode.number}`),
         element("h3", {}, capital(mode.title)),
         ...(picture ? [picture] : []),
-        element("ul", { class: "mode-facts" }, fact(number(mode.count), mode.count === 1 ? "scenario" : "scenarios"), ...severity),
+        element("ul", { class: "mode-facts" }, fact(number(mode.count), mode.count === 1 ? "scenario" : "scenarios"), ...often, ...severity),
         element("p", { class: "mode-buttons" }, play, fold),
       ),
       ...(data.mode_ids ? [element("p", { class: "mode-status" }, element("span", { "data-mode": data.mode_ids[mode.number] }))] : []), // see status.js

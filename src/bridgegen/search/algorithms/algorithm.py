@@ -74,6 +74,46 @@ class Arena(Protocol):
         ...
 
 
+class Road(Protocol):
+    """How the rows of a search are distributed on the road, by points of standard normal space.
+
+    Attributes:
+        dimensions: of that space.
+        share: how likely a standard normal point is feasible: low, middle and high value.
+        continuous: ``(dimensions,)``, which scores stand for a value each: of a parameter with
+            single values, many scores stand for one.
+    """
+
+    dimensions: int
+    share: tuple[float, float, float]
+    continuous: Bool
+
+    def rows(self, Z: Float) -> tuple[Float, Bool, Float]:
+        """Return the rows that points stand for.
+
+        Args:
+            Z: ``(N, dimensions)``.
+
+        Returns:
+            U ``(N, n_var)``; ``(N,)`` which are feasible; and ``(N,)`` the logarithm of how much
+            likelier each one is uniformly over the ranges than on the road.
+        """
+        ...
+
+    def met(self, n: int, random: np.random.Generator) -> Float:
+        """Return n feasible points as on the road, ``(n, dimensions)``."""
+        ...
+
+    def even(self, n: int, random: np.random.Generator) -> tuple[Float, Bool]:
+        """Return points whose rows are uniform over the ranges.
+
+        Returns:
+            ``(n, dimensions)``; and ``(n,)`` which can happen on the road: the others stand for
+            nothing.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Problem:
     """A search problem.
@@ -85,6 +125,7 @@ class Problem:
         arena: where an adversary drives in closed loop; None without one.
         levels: per column of U, into how many equal intervals it is divided, each a single value
             of a category or an integer; 0: it is continuous. Empty: all are.
+        road: how rows are distributed on the road; None: uniformly in the unit cube.
     """
 
     parameters: tuple[str, ...]
@@ -92,6 +133,7 @@ class Problem:
     n_obj: int = 1
     arena: Arena | None = None
     levels: tuple[int, ...] = ()
+    road: Road | None = None
 
     @property
     def n_var(self) -> int:

@@ -3,6 +3,9 @@
 AUTO = "auto"
 """Name of the automatic choice of an algorithm."""
 
+RATE = "rate"
+"""Name of the algorithm whose rows also say how often."""
+
 MOST_MODELLED = 100_000
 """Largest number of rows for which models of the space are known to be worth their time."""
 MOST_PARAMETERS = 40

@@ -29,6 +29,7 @@ _PLACES = {
     "map-elites": "bridgegen.search.algorithms.map_elites:MAPElites",
     "turbo": "bridgegen.search.algorithms.turbo:TuRBO",
     "surrogate": "bridgegen.search.algorithms.surrogate:Surrogate",
+    "rate": "bridgegen.search.algorithms.rate:Rate",
     "dqn": "bridgegen.search.algorithms.reinforcement:DQN",
     "ddpg": "bridgegen.search.algorithms.reinforcement:DDPG",
     "ppo": "bridgegen.search.algorithms.reinforcement:PPO",

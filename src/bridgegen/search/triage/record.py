@@ -4,7 +4,7 @@ Every list has a limit, so that the size of the record does not depend on the le
 """
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -23,6 +23,10 @@ MOST_EXAMPLES = 20
 """Largest number of evaluations that are named of a mode, worst first."""
 
 MOST_NEIGHBOURHOODS = 2000
+
+NEAR = 0.1
+"""Distance within which scenarios are no different ones: root mean square of the differences of the
+searched parameters, as shares of what is searched."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -96,10 +100,69 @@ class FreshRows(_Model):
     Attributes:
         harm: of each; None of one without a result, or with implausible traffic.
         mode: the number of the failure mode that each is of; 0 of no recorded one.
+        near: harmful ones within `NEAR` of a failure that was found; None in records of earlier
+            versions.
     """
 
     harm: Annotated[tuple[Share | None, ...], Field(max_length=10_000)]
     mode: Annotated[tuple[Count, ...], Field(max_length=10_000)]
+    near: Count | None = None
+
+
+class Frequency(_Model):
+    """How likely an event is: on the road, or in the ranges.
+
+    Attributes:
+        estimate: the probability; None where its interval is not believed.
+        low: lower end of the 95 % interval.
+        high: its upper end; where there is no estimate, of what rows say that were drawn as on the
+            road.
+        hits: effective number of failures behind it.
+        doubt: why there is no estimate; "" where there is one.
+    """
+
+    estimate: Share | None
+    low: Share
+    high: Share
+    hits: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+    doubt: Text = ""
+
+    @property
+    def sentence(self) -> str:
+        """In words: "2.1e-4 (95 %: 1.6e-4 to 3.9e-4)"."""
+        if self.estimate is None:
+            return f"at most {self.high:.2g} (95 %); not estimated: {self.doubt}"
+        if not self.estimate:
+            return f"at most {self.high:.2g} (95 %)"
+        return f"{self.estimate:.2g} (95 %: {self.low:.2g} to {self.high:.2g})"
+
+
+class Rate(_Model):
+    """How likely harm is, from the rows of a search that were drawn with known chances.
+
+    Attributes:
+        harm: the probability of harm.
+        source: of the exposure; "" where rows stand for the ranges.
+        met: whether weather is as it is met, without an exposure.
+        rows: that were drawn, repeated ones included.
+        road: of them, how many were drawn as on the road.
+    """
+
+    harm: Frequency
+    source: Text
+    met: bool
+    rows: Count
+    road: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+    @property
+    def sentence(self) -> str:
+        """In words, with what it is a probability of."""
+        if self.source:
+            of = f"per encounter, by the exposure: {self.source}"
+        else:
+            even = "weather as it is met, all else uniform" if self.met else "uniform"
+            of = f"of the ranges ({even}; not a rate on roads: no exposure is given)"
+        return f"P(harm) {self.harm.sentence}, {of}"
 
 
 class Treatment(_Model):
@@ -375,6 +438,7 @@ class Mode(_Model):
         examples: evaluations, the worst first; not all of them.
         exports: names of the exported scenarios, the one that stands for it first.
         minimal: its minimal scenario, if one was sought and found.
+        probability: how likely it is; None where the run does not estimate it.
     """
 
     number: Annotated[int, Field(ge=1, le=10**6)]
@@ -399,6 +463,7 @@ class Mode(_Model):
     minimal: Minimal | None = None
     rules: Annotated[tuple[tuple[Text, Count], ...], Field(max_length=100)] = ()
     judgement: Text = ""
+    probability: Frequency | None = None
 
     @property
     def knife_edge(self) -> bool:
@@ -514,6 +579,7 @@ class Triage(_Model):
             evenly spread over the run; empty where none were made.
         beyond: exported evaluations outside the region that a dossier calls validated.
         extrapolated: likewise, as a warning; "" where none is, or no dossier was found.
+        rate: how likely harm is; None where the run does not estimate it.
     """
 
     schema_version: Literal[1] = 1
@@ -536,6 +602,7 @@ class Triage(_Model):
     step_checks: Annotated[tuple[StepCheck, ...], Field(max_length=MOST_NEIGHBOURHOODS)] = ()
     beyond: Annotated[tuple[Count, ...], Field(max_length=10_000)] = ()
     extrapolated: Text = ""
+    rate: Rate | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> "Triage":
@@ -596,7 +663,9 @@ def write_record(folder: Path, triage: Triage) -> Path:
         StorageError: it cannot be written.
     """
     path = folder / JSON_FILE
-    write_whole(path, [triage.model_dump_json(indent=1).encode(), b"\n"])
+    # As in runs that estimate no rates.
+    none: Any = None if triage.rate else {"rate": True, "modes": {"__all__": {"probability"}}}
+    write_whole(path, [triage.model_dump_json(indent=1, exclude=none).encode(), b"\n"])
     return path
 
 

@@ -20,6 +20,7 @@ from bridgegen.engine.trials import EVENT
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.scenario.language.prior import surprise
 from bridgegen.scenario.odd.bounding import OddBound
+from bridgegen.search.surrogates.known import distances
 from bridgegen.search.triage.bound import (
     CONTACT,
     UNBIASED,
@@ -46,16 +47,21 @@ from bridgegen.search.triage.modes import (
 )
 from bridgegen.search.triage.moves import searched
 from bridgegen.search.triage.neighbours import NEIGHBOURS, RADIUS, AsIs, neighbourhoods
+from bridgegen.search.triage.rates import Drawn as DrawnRows
+from bridgegen.search.triage.rates import how_likely
 from bridgegen.search.triage.record import (
     MOST_EXAMPLES,
     MOST_MODES,
+    NEAR,
     Drawn,
     Estimate,
+    Frequency,
     FreshRows,
     Met,
     Minimal,
     Mode,
     Neighbourhood,
+    Rate,
     StepCheck,
     Triage,
 )
@@ -91,6 +97,7 @@ def triage(
     chosen: Sequence[int] | None = None,
     effort: Effort = FULL,
     domain: str = "",
+    drawn: DrawnRows | None = None,
 ) -> Triaged:
     """Group a run's harmful rows into failure modes, and test the robustness of each finding.
 
@@ -106,8 +113,9 @@ def triage(
             them; the harmful ones among them are tested.
         effort: how much is tested.
         domain: a sentence if the driver is not made for the scenario.
+        drawn: the rows as they were drawn, of a run that estimates rates.
     """
-    return _Triage(pipeline, rows, algorithm, seed, keep, chosen, effort, domain).run()
+    return _Triage(pipeline, rows, algorithm, seed, keep, chosen, effort, domain, drawn).run()
 
 
 def harmful_rows(
@@ -145,7 +153,9 @@ class _Triage:
         chosen: Sequence[int] | None,
         effort: Effort,
         domain: str,
+        drawn: DrawnRows | None,
     ) -> None:
+        self._drawn = drawn
         self._effort, self._tests = effort, pipeline.tries and effort.tests
         self._pipeline, self._rows, self._space = pipeline, rows, pipeline.space
         self._algorithm, self._seed, self._keep = algorithm, seed, keep
@@ -402,7 +412,12 @@ class _Triage:
                 mode[i] = same[int(np.argmin(gaps))] + 1
         ok = int(results.ok.sum())
         harm = zip(results.harm.tolist(), results.ok.tolist(), strict=True)
-        fresh = FreshRows(harm=tuple(item if has else None for item, has in harm), mode=tuple(mode))
+        off = distances(U[results.harmful & results.ok], own)
+        fresh = FreshRows(
+            harm=tuple(item if has else None for item, has in harm),
+            mode=tuple(mode),
+            near=int((off < NEAR).sum()),
+        )
         each = [drawn_of("fresh", mode.count(k), ok) for k in range(1, len(groups) + 1)]
         return drawn_of("fresh", int(results.harmful.sum()), ok), each, fresh
 
@@ -446,6 +461,7 @@ class _Triage:
                     examples=tuple(ids[item.rows[:MOST_EXAMPLES]].tolist()),
                     exports=(*([names[i]] if i in names else []), *kept),
                     minimal=minimal[k - 1],
+                    probability=self._how_likely(self._at[item.rows]),
                 )
             )
         ok = rows.status == 0
@@ -479,11 +495,29 @@ class _Triage:
             influences=influences(
                 self._space, rows.X, np.isin(np.arange(len(ok)), self._at), ok & ~implausible
             ),
-            untested=untested, fresh=fresh,
+            untested=untested, fresh=fresh, rate=self._rate(),
             step_checks=tuple(
                 [self._steps[i] for i in dict.fromkeys([*shown, *exports]) if i in self._steps]
                 + (self._unharmed() if self._tests else [])
             ),
+        )  # fmt: skip
+
+    def _how_likely(self, at: Int) -> Frequency | None:
+        """Return how likely one of some rows is, where the run estimates it."""
+        if self._drawn is None:
+            return None
+        happens = np.zeros(len(self._rows.id), np.bool_)
+        happens[at] = True
+        return how_likely(self._drawn, happens)
+
+    def _rate(self) -> Rate | None:
+        """Return how likely harm is, where the run estimates it."""
+        if (harm := self._how_likely(self._at)) is None or self._drawn is None:
+            return None
+        priors = [self._space.parameters[name].prior for name in self._space.variables]
+        return Rate(
+            harm=harm, source=self._drawn.source, met=any(priors),
+            rows=len(self._drawn.ids), road=float(self._drawn.draws.road.sum()),
         )  # fmt: skip
 
     def _avoids(self, at: Int) -> Bool:

@@ -1,13 +1,35 @@
 """A run's triage in lines of text, for the terminal."""
 
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.base.units import percent
 from bridgegen.search.triage.influence import ends_in_words, in_words
-from bridgegen.search.triage.record import Mode, Triage
+from bridgegen.search.triage.record import NEAR, Mode, Triage
 
 
 def headline(found: Triage) -> str:
     """Return the number of failure modes, or the least margin, and the share of the space."""
     return found.bound.sentence
+
+
+def covered(found: Triage | None) -> tuple[int, int] | None:
+    """Return how many fresh random failures lie near one that was found, of how many; or None."""
+    if found is None or found.fresh is None or found.fresh.near is None:
+        return None
+    harmful = found.bound.space.harmful
+    return (found.fresh.near, harmful) if harmful and found.bound.harmful else None
+
+
+def covered_in_words(found: Triage) -> str:
+    """Return the share of fresh random failures that lies near one that was found, or ""."""
+    if (counts := covered(found)) is None:
+        return ""
+    near, harmful = counts
+    low, high = clopper_pearson(near, harmful)
+    return (
+        f"{near} of the {harmful} that fail, {percent(near / harmful)} ({percent(low)} "
+        f"to {percent(high)}), lie within {NEAR:g} of a failure found (root mean square of the "
+        "searched parameters' shares)"
+    )
 
 
 def mode_in_words(mode: Mode, found: Triage) -> str:
@@ -20,6 +42,7 @@ def mode_in_words(mode: Mode, found: Triage) -> str:
         parts.append(f"MAIS3+ {percent(mode.severity)}")
     else:
         parts.append(f"harm {mode.harm:.2f}")
+    parts.append(f"P {mode.probability.sentence}" if mode.probability else "")
     parts.append(robustness_in_words(mode, found))
     parts.append(step_in_words(mode, found))
     parts.append(mode.judgement or mode.cause)

@@ -12,12 +12,10 @@ Journal 59 (2017) 1174-1186.
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.optimize
-import scipy.special
 import scipy.stats
 
 from bridgegen.base.arrays import Float, Int
-from bridgegen.base.statistics import clopper_pearson
+from bridgegen.base.statistics import clopper_pearson, weighted_counts
 from bridgegen.jobs.risk.estimators.problem import SCORE
 
 LEVEL = 0.95
@@ -144,32 +142,8 @@ def of_counts(hits: int, rows: int, each: float) -> Probability:
 
 
 def of_weights(parts: Float) -> Probability:
-    """Return the interval of a sum of weights of hits, each of which happens or not.
-
-    Args:
-        parts: ``(M,)`` the weights of the hits, of which there is at least one.
-    """
-    largest = float(parts.max())
-    total, square = float(parts.sum()), float(np.sum(parts * parts))
-    more, more_square = total + largest, square + largest * largest
-
-    def below(value: float) -> float:
-        """Return the mid-P confidence that the mean is below a value."""
-        lower = scipy.special.gammainc(total * total / square, value * total / square)
-        upper = scipy.special.gammainc(more * more / more_square, value * more / more_square)
-        return float(0.5 * (lower + upper))
-
-    def quantile(confidence: float) -> float:
-        end = more
-        # Doubled until the root lies between the ends: brentq needs a change of sign.
-        while below(end) < confidence:
-            end *= 2.0
-        return float(
-            scipy.optimize.brentq(lambda x: below(x) - confidence, 0.0, end, xtol=1e-9 * more)
-        )
-
-    tail = 0.5 * (1.0 - LEVEL)
-    return Probability(total, quantile(tail), quantile(1.0 - tail), quantile(LEVEL))
+    """Return the interval of a sum of weights of hits, see `weighted_counts`."""
+    return Probability(*weighted_counts(parts))
 
 
 def of_repetitions(sums: Float) -> Probability:
