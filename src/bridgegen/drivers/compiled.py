@@ -190,6 +190,11 @@ def compiled_driver(
     if not isinstance(memory, int) or memory < 0:
         raise InputError(f"memory must be a whole number >= 0, got {memory!r}")
     words = checked_wants(wants)
+    if "seed" in words:
+        raise InputError(
+            "a compiled driver is given no seed: all that it keeps is its memory, so it repeats; "
+            "leave 'seed' out of wants"
+        )
     return lambda function: CompiledDriver(function, memory, words)
 
 

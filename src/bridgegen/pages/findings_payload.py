@@ -9,7 +9,7 @@ from bridgegen.pages.playback import Conflict
 from bridgegen.search.triage.influence import ends_in_words
 from bridgegen.search.triage.judgement import judgement
 from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
-from bridgegen.search.triage.words import step_in_words, steps_in_words
+from bridgegen.search.triage.words import repeats_in_words, step_in_words, steps_in_words
 
 FINDING_FIELDS = ("conflict", "conflict_type", "responsible", "rule", "partner")
 """The fields of a row's finding, in the page's order."""
@@ -72,13 +72,21 @@ def conflict_payload(conflict: Conflict, cause: str = "") -> dict[str, Any]:
     }
 
 
+def _repeats(mode: Mode, found: Triage) -> str:
+    """Return how many repeats of a mode fail; of one that changes, what its playback is, too."""
+    again, text = found.of_repeats(mode.shown), repeats_in_words(mode, found)
+    is_same = again is None or again.agrees
+    return text if is_same else f"{text}; its playback is one more repeat, which may not fail"
+
+
 def triage_payload(found: Triage) -> dict[str, Any]:
     """Return the failure modes, or without any the bound and the nearest scenarios."""
     return {
         "ego": found.ego,
         "baseline": found.baseline,
         "modes": [
-            _mode(mode, found.neighbourhood(mode.shown)) | {"step": step_in_words(mode, found)}
+            _mode(mode, found.neighbourhood(mode.shown))
+            | {"step": "; ".join(filter(None, (step_in_words(mode, found), _repeats(mode, found))))}
             for mode in found.modes[:MOST_MODES]
         ],
         "more": max(0, len(found.modes) - MOST_MODES) + found.unrecorded_modes,

@@ -232,7 +232,9 @@ def _mode_lines(found: "Triage") -> list[str]:
         what, _, _ = mode.title.partition(" (")
         worst = percent(mode.severity) if mode.conflict == "contact" else mode.conflict
         hangs = "step-dependent" if step_in_words(mode, found) else ""
-        about = " · ".join(filter(None, [mode.rule, worst, mode.cause, hangs]))
+        chance = found.chance(mode)
+        likely = "" if chance is None else f"P {chance[0]:.2f}"
+        about = " · ".join(filter(None, [mode.rule, worst, mode.cause, hangs, likely]))
         head = f"{mode.number:>2} {bar:<{BAR}} {mode.count:>5,}  "
         room = max(WIDTH - len(head) - len(about) - 3, 12)
         short = what if len(what) <= room else f"{what[: room - 1]}…"
@@ -243,7 +245,11 @@ def _mode_lines(found: "Triage") -> list[str]:
 
 def _found_lines(found: "Triage") -> list[str]:
     """Return how common failures are, the simplest one, what matters, and what does not count."""
-    from bridgegen.search.triage.words import parameters_in_words, steps_in_words
+    from bridgegen.search.triage.words import (
+        all_repeats_in_words,
+        parameters_in_words,
+        steps_in_words,
+    )
 
     space, lines = found.bound.space, []
     if found.bound.judged and space.drawn and space.rows:
@@ -261,6 +267,8 @@ def _found_lines(found: "Triage") -> list[str]:
         lines.append(f"What matters most: {text}")
     if found.bound.not_counted:
         lines.append(f"N{found.bound.not_counted[1:]}")
+    if again := all_repeats_in_words(found):
+        lines.append(f"Repeats: {again}")
     if found.missed:
         lines.append(f"Time step: {steps_in_words(found)}")
     if found.extrapolated:

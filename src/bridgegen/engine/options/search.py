@@ -33,6 +33,7 @@ MAX_BUDGET = 10**7
 MAX_SEED = 2**32 - 1
 MAX_KEEP = 1000
 MAX_AHEAD = 10_000
+MAX_REPEATS = 1000
 
 OF_ODD = option(
     ODD,
@@ -409,6 +410,19 @@ class SearchOptions(CommonOptions):
             before="full",
             group=OUTPUT,
             names="triage",
+        ),
+    )
+    repeats: int | None = field(
+        default=None,
+        metadata=option(
+            WHOLE,
+            "How often findings are evaluated again, at most, if driver or simulator may not "
+            "repeat: how likely each fails, with an interval.",
+            hint="8 at least tell whether it mostly fails.",
+            shown="1: never again",
+            limits=(1, MAX_REPEATS),
+            before=None,
+            group=OF_DRIVER,
         ),
     )
     simulator: SimulatorChoice = field(

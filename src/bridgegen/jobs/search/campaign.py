@@ -60,7 +60,7 @@ from bridgegen.search.algorithms.algorithm import Problem, resolve
 from bridgegen.search.algorithms.automatic import AUTO, automatic
 from bridgegen.search.triage.effort import effort
 from bridgegen.search.triage.fresh import failing_draws
-from bridgegen.search.triage.record import write_record
+from bridgegen.search.triage.record import JSON_FILE, Repeated, read_record, write_record
 from bridgegen.search.triage.triage import triage
 from bridgegen.simulation.choice import SimulatorChoice
 
@@ -386,6 +386,8 @@ def _finish(
             chosen=best.tolist() if rule == "criteria" else None,
             effort=effort(settings.triage),
             domain=store.domain,
+            repeats=_repeats(pipeline, settings, callbacks),
+            known=_known_repeats(store, rows),
         )
         if rule != "criteria":
             best = np.array(triaged.exports, dtype=np.int64)
@@ -407,6 +409,27 @@ def _finish(
     there = np.flatnonzero(np.isin(best, [item.evaluation for item in exported]))
     write_run_report(pipeline, run, rows, exported, replays.take(there) if replays else None)
     return run
+
+
+def _repeats(pipeline: Pipeline, settings: Settings, callbacks: SearchCallbacks) -> int:
+    """Return how often findings are evaluated again: never where it is known that they repeat."""
+    most = settings.repeats or 1
+    if most > 1 and pipeline.repeats:
+        callbacks.warning(
+            f"nothing is evaluated again (--repeats {most}): {pipeline.driver.label} in the "
+            "embedded simulator gives the same result each time"
+        )
+        return 1
+    return most
+
+
+def _known_repeats(store: Store, rows: Recorded) -> dict[int, Repeated]:
+    """Return the repeats that an earlier triage of these rows has recorded, by evaluation."""
+    try:
+        record = read_record(store.folder / JSON_FILE, rows.digest())
+    except BridgeGenError:  # damaged, or of fewer rows: it is written anew
+        record = None
+    return {item.evaluation: item for item in record.repeated} if record else {}
 
 
 def _extrapolated(

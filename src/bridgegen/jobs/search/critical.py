@@ -111,7 +111,7 @@ def export_critical(
             files.append(fresh / f"{name}.json")
             facts = (
                 _facts(pipeline, rows, i, name)
-                | _triaged(name, quick, tested, triage)
+                | _triaged(name, int(rows.id[i]), quick, tested, triage)
                 | {"judgement": judged or None}
                 | {"conflict": None if conflict is None else conflict.to_dict()}
             )
@@ -172,16 +172,18 @@ def _cause(quick: Cause, tested: Neighbourhood | None) -> Cause:
 
 
 def _triaged(
-    name: str, quick: Cause, tested: Neighbourhood | None, triage: Triage | None
+    name: str, row: int, quick: Cause, tested: Neighbourhood | None, triage: Triage | None
 ) -> dict[str, object]:
     """Return the triage's findings on an exported scenario, as JSON's types."""
     modes = [mode.number for mode in (triage.modes if triage else ()) if name in mode.exports]
     cause = tested.cause if tested is not None and tested.cause else quick.label
+    again = triage.of_repeats(row) if triage else None
     return {
         "cause": cause or None,
         "quick_cause": quick.label or None,
         "mode": modes[0] if modes else None,
         "robustness": tested.robustness if tested is not None else None,
+        **({} if again is None else {"repeats": again.facts()}),
     }
 
 

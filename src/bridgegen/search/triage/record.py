@@ -12,6 +12,7 @@ from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import FileFormatError
 from bridgegen.base.records import read_model
+from bridgegen.base.statistics import beta_binomial, confidence_sequence
 
 JSON_FILE = "triage.json"
 """File of the triage's record in a run's folder."""
@@ -242,6 +243,97 @@ class StepCheck(_Model):
             f"depends on the time step: {_kind(first)} at {self.time_step:g} s, {_kind(other)} at "
             f"{self.time_step / other.steps:g} s"
         )
+
+
+class Repeated(_Model):
+    """An evaluation that was made again, as the driver or the simulator may not repeat.
+
+    Attributes:
+        evaluation: its number.
+        repeats: further evaluations that have a verdict; the first, by which it was chosen, is none
+            of them.
+        fails: of them.
+        lost: further ones without a verdict: no result, or implausible traffic.
+        failed: whether the first evaluation did.
+        mode: number of the failure mode that it is of; 0 of none.
+    """
+
+    evaluation: Count
+    repeats: Count
+    fails: Count
+    lost: Count = 0
+    failed: bool = False
+    mode: Count = 0
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Repeated":
+        if self.fails > self.repeats:
+            raise ValueError("no more repeats may fail than there are")
+        return self
+
+    @property
+    def probability(self) -> float:
+        """P(fail | scenario): the mean of what the repeats leave of an even prior."""
+        return (self.fails + 1.0) / (self.repeats + 2.0)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Its 95 % interval, which holds whenever the repeats are stopped."""
+        return confidence_sequence(self.fails, self.repeats)
+
+    @property
+    def decided(self) -> bool:
+        """Whether it is known, with 95 %, that it fails more often than not, or less often."""
+        low, high = self.interval
+        return low > 0.5 or high < 0.5
+
+    @property
+    def agrees(self) -> bool:
+        """Whether all repeats have the verdict of the first evaluation."""
+        return self.fails == self.repeats * self.failed
+
+    @property
+    def sentence(self) -> str:
+        """The result in words."""
+        return repeats_sentence(self.fails, self.repeats, self.lost)
+
+    def facts(self) -> dict[str, object]:
+        """Return all of it as JSON's types."""
+        low, high = self.interval
+        return self.model_dump(include={"fails", "repeats", "lost"}) | {
+            "p_fail": self.probability,
+            "low": low,
+            "high": high,
+            "needed": repeats_needed(self.fails, self.repeats),
+            "sentence": self.sentence,
+        }
+
+
+def repeats_sentence(fails: int, repeats: int, lost: int = 0) -> str:
+    """Return how many repeats fail, in words, with P(fail) and its interval."""
+    parts = ["has no repeat with a verdict"]
+    if repeats:
+        low, high = confidence_sequence(fails, repeats)
+        parts = [
+            f"fails in {fails} of {repeats} repeats (P {(fails + 1) / (repeats + 2):.2f}, 95 %: "
+            f"{low:.2f} to {high:.2f})"
+        ]
+    return ", ".join([*parts, *([f"{lost} without a verdict"] if lost else [])])
+
+
+MOST_NEEDED = 1000
+
+
+def repeats_needed(fails: int, repeats: int) -> int | None:
+    """Return how many repeats show at 95 % whether it mostly fails, if this share of them fails.
+
+    None: more than `MOST_NEEDED`, since about half of them fail; or there are none yet.
+    """
+    for n in range(max(repeats, 1), MOST_NEEDED + 1 if repeats else 0):
+        low, high = confidence_sequence(round(fails / repeats * n), n)
+        if low > 0.5 or high < 0.5:
+            return n
+    return None
 
 
 def _kind(one: AtStep) -> str:
@@ -507,6 +599,8 @@ class Triage(_Model):
             evenly spread over the run; empty where none were made.
         beyond: exported evaluations outside the region that a dossier calls validated.
         extrapolated: likewise, as a warning; "" where none is, or no dossier was found.
+        repeated: evaluations that were made again (``--repeats``): exported ones, those that stand
+            for modes, further worst ones of each, and some that came near to failing.
     """
 
     schema_version: Literal[1] = 1
@@ -529,6 +623,7 @@ class Triage(_Model):
     step_checks: Annotated[tuple[StepCheck, ...], Field(max_length=MOST_NEIGHBOURHOODS)] = ()
     beyond: Annotated[tuple[Count, ...], Field(max_length=10_000)] = ()
     extrapolated: Text = ""
+    repeated: Annotated[tuple[Repeated, ...], Field(max_length=MOST_NEIGHBOURHOODS)] = ()
 
     @model_validator(mode="after")
     def _consistent(self) -> "Triage":
@@ -546,6 +641,7 @@ class Triage(_Model):
         named = [i for mode in self.modes for i in (mode.worst, mode.shown, *mode.examples)]
         named += [neighbourhood.evaluation for neighbourhood in self.neighbourhoods]
         named += [check.evaluation for check in self.step_checks]
+        named += [item.evaluation for item in self.repeated]
         # A record may be damaged or another's: readers index the store's rows by these numbers.
         if max(named, default=-1) >= self.bound.evaluations:
             raise ValueError(f"evaluation {max(named)} must be one of the run's")
@@ -560,11 +656,27 @@ class Triage(_Model):
         """Return the results of an evaluation at fractions of the time step, if it was checked."""
         return next((item for item in self.step_checks if item.evaluation == evaluation), None)
 
+    def of_repeats(self, evaluation: int) -> Repeated | None:
+        """Return the results of an evaluation's repeats, if it was made again."""
+        return next((item for item in self.repeated if item.evaluation == evaluation), None)
+
+    def chance(self, mode: Mode) -> tuple[float, float, float] | None:
+        """Return P(fail | scenario) of a mode's repeated rows: their mean, and its 95 % interval.
+
+        None where none was repeated.
+        """
+        some = [item for item in self.repeated if item.mode == mode.number and item.repeats]
+        if not some:
+            return None
+        return beta_binomial([item.fails for item in some], [item.repeats for item in some])
+
     def doubts(self, evaluation: int) -> str:
         """Return what makes the verdict on an evaluation doubtful; "" if nothing is known to."""
         check, beyond = self.step_check(evaluation), evaluation in self.beyond
+        again = self.of_repeats(evaluation)
         return ", ".join(
-            ["depends on the time step"] * (check is not None and not check.stable)
+            ([] if again is None or again.agrees else [again.sentence])
+            + ["depends on the time step"] * (check is not None and not check.stable)
             + ["outside the validated region"] * beyond
         )
 
@@ -589,7 +701,8 @@ def write_record(folder: Path, triage: Triage) -> Path:
         StorageError: it cannot be written.
     """
     path = folder / JSON_FILE
-    write_whole(path, [triage.model_dump_json(indent=1).encode(), b"\n"])
+    unused = None if triage.repeated else {"repeated"}
+    write_whole(path, [triage.model_dump_json(indent=1, exclude=unused).encode(), b"\n"])
     return path
 
 

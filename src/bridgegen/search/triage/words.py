@@ -21,7 +21,7 @@ def mode_in_words(mode: Mode, found: Triage) -> str:
     else:
         parts.append(f"harm {mode.harm:.2f}")
     parts.append(robustness_in_words(mode, found))
-    parts.append(step_in_words(mode, found))
+    parts += [step_in_words(mode, found), repeats_in_words(mode, found)]
     parts.append(mode.judgement or mode.cause)
     if mode.space.drawn and mode.space.share is not None:
         low, high = percent(mode.space.low), percent(mode.space.high)
@@ -42,6 +42,39 @@ def step_in_words(mode: Mode, found: Triage) -> str:
     """Return how the verdict on the evaluation that stands for a mode hangs on the time step."""
     check = found.step_check(mode.shown)
     return check.sentence if check else ""
+
+
+def repeats_in_words(mode: Mode, found: Triage) -> str:
+    """Return how many repeats of the evaluation that stands for a mode fail, and of its rows."""
+    again, chance = found.of_repeats(mode.shown), found.chance(mode)
+    if again is None or chance is None:
+        return ""
+    rows = sum(item.mode == mode.number for item in found.repeated)
+    mean, low, high = chance
+    text = f"{again.sentence}"
+    if rows > 1 and not all(item.agrees for item in found.repeated if item.mode == mode.number):
+        text += f"; its {rows} repeated rows: P {mean:.2f} (95 %: {low:.2f} to {high:.2f})"
+    return text
+
+
+def all_repeats_in_words(found: Triage) -> str:
+    """Return how many evaluations repeat their verdict, in words; "" if none was made again."""
+    again = [item for item in found.repeated if item.repeats]
+    if not found.repeated:
+        return ""
+    changed, parts = [item for item in again if not item.agrees], []
+    if not changed:
+        parts.append(f"all {len(again)} scenarios that were evaluated again keep their verdict")
+    else:
+        parts.append(
+            f"{len(changed)} of {len(again)} scenarios that were evaluated again change their "
+            "verdict: the driver does not repeat"
+        )
+    if passed := sum(not item.failed for item in changed):
+        parts.append(f"{passed} of these passed at first")
+    if lost := sum(item.lost for item in found.repeated):
+        parts.append(f"{lost} repeats without a verdict")
+    return "; ".join(parts)
 
 
 def steps_in_words(found: Triage) -> str:

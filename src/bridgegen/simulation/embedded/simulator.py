@@ -210,6 +210,7 @@ class EmbeddedSimulator:
         kinematic: bool = False,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
+        repeat: int = 0,
     ) -> Rollout:
         """See `Simulator`; runs without the GIL.
 
@@ -222,6 +223,7 @@ class EmbeddedSimulator:
             kinematic: whether the ego's vehicle is, whatever its own is.
             noise: ``(N,)`` keys of the rows' random numbers; see ``noise_keys``.
             until_collision: whether a row ends soon after the ego collides; see `Batch`.
+            repeat: which evaluation of the rows it is; see `Batch`.
 
         Raises:
             InputError: see `Simulator`; or a user's driver that cannot be made, or a driver that
@@ -254,6 +256,7 @@ class EmbeddedSimulator:
             kinematic=kinematic,
             noise=noise,
             until_collision=until_collision,
+            repeat=repeat,
         )
         return self._own.drive(chosen.changed(dry=dry, kinematic=kinematic), some, len(rows))
 
@@ -386,6 +389,7 @@ class EmbeddedSimulator:
         own: Traits | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
+        repeat: int = 0,
     ) -> "Batch":
         """Set N rows up, for a driver that is asked at every instant.
 
@@ -399,8 +403,9 @@ class EmbeddedSimulator:
             own: what a driver of the user's own needs; None without one.
             noise: likewise.
             until_collision: likewise.
+            repeat: likewise.
         """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
         program = self.program.changed(driver=driver, dry=dry, kinematic=kinematic)
-        return Batch(program, roads, rows, values, own, noise, until_collision)
+        return Batch(program, roads, rows, values, own, noise, until_collision, repeat)
