@@ -72,13 +72,6 @@ def conflict_payload(conflict: Conflict, cause: str = "") -> dict[str, Any]:
     }
 
 
-def _repeats(mode: Mode, found: Triage) -> str:
-    """Return how many repeats of a mode fail; of one that changes, what its playback is, too."""
-    again, text = found.of_repeats(mode.shown), repeats_in_words(mode, found)
-    is_same = again is None or again.agrees
-    return text if is_same else f"{text}; its playback is one more repeat, which may not fail"
-
-
 def triage_payload(found: Triage) -> dict[str, Any]:
     """Return the failure modes, or without any the bound and the nearest scenarios."""
     return {
@@ -86,7 +79,7 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "baseline": found.baseline,
         "modes": [
             _mode(mode, found.neighbourhood(mode.shown))
-            | {"step": "; ".join(filter(None, (step_in_words(mode, found), _repeats(mode, found))))}
+            | {"step": step_in_words(mode, found) or repeats_in_words(mode, found)}
             for mode in found.modes[:MOST_MODES]
         ],
         "more": max(0, len(found.modes) - MOST_MODES) + found.unrecorded_modes,
@@ -126,6 +119,9 @@ def _judged(found: Triage) -> dict[int, str]:
     for check in found.step_checks:
         if check.sentence:
             said.setdefault(check.evaluation, []).append(check.sentence)
+    for item in found.repeated:
+        played = "" if item.agrees else "; what is played is one more, which may not fail"
+        said.setdefault(item.evaluation, []).append(f"{item.sentence}{played}")
     return {evaluation: "; ".join(texts) for evaluation, texts in said.items()}
 
 

@@ -210,6 +210,8 @@ def conclusion(run: "Run") -> str:
         return f"{word}  {name}: violates {', '.join(violated)}"
     if run.verdict == "fails":
         drawn = f"{bound.space.harmful} of {bound.space.rows} fresh random draws"
+        if not bound.space.harmful:
+            drawn = f"repeats of {bound.in_repeats} evaluations that passed at first"
         none = f"in none of {bound.evaluations:,} evaluations"
         return f"{word}  {name}: in {drawn}, though {none}"
     _, _, why = bound.sentence.rstrip(".").partition(": ")

@@ -43,6 +43,7 @@ class _Settings(Strict):
     secret: str | None = None
     drawn: int = 0
     odd: dict[str, Any] | None = None
+    repeats: int | None = None
     version: str
 
 
@@ -211,6 +212,7 @@ def job_of(suite: SuiteRun, result: EntryResult, simulator: SimulatorChoice | No
         settings.seed,
         settings.matrix,
         draw=Draw(settings.secret, settings.drawn) if settings.secret else None,
+        repeats=settings.repeats or 1,
     )
 
 

@@ -542,6 +542,7 @@ class Bound(_Model):
         not_counted: the collisions, near misses and evaluations that do not count as failures,
             with their reasons; "" where there are none.
         sentence: in words.
+        in_repeats: evaluations that passed at first and fail in a repeat.
     """
 
     evaluations: Count
@@ -553,6 +554,7 @@ class Bound(_Model):
     verdict: Verdict | Literal[""] = ""
     not_counted: Text = ""
     sentence: Text
+    in_repeats: Count = 0
 
     @property
     def in_full(self) -> str:
@@ -561,8 +563,9 @@ class Bound(_Model):
 
     @property
     def failures(self) -> int:
-        """Harmful evaluations; if there are none, harmful ones of the fresh random draws."""
-        return self.harmful or (self.space.harmful if self.space.drawn == "fresh" else 0)
+        """Harmful evaluations; without any, those of the fresh random draws, or of repeats."""
+        drawn = self.space.harmful if self.space.drawn == "fresh" else 0
+        return self.harmful or drawn or self.in_repeats
 
     @property
     def judged(self) -> bool:
@@ -701,7 +704,8 @@ def write_record(folder: Path, triage: Triage) -> Path:
         StorageError: it cannot be written.
     """
     path = folder / JSON_FILE
-    unused = None if triage.repeated else {"repeated"}
+    # Without repeats the record is as it was before there were any.
+    unused = None if triage.repeated else {"repeated": True, "bound": {"in_repeats"}}
     write_whole(path, [triage.model_dump_json(indent=1, exclude=unused).encode(), b"\n"])
     return path
 

@@ -537,6 +537,7 @@ class _Triage:
                     rows.metrics, pipeline.metrics, self._harm, rows.id, ok & ~implausible,
                 ),
                 modes=len(modes), ego=pipeline.driver.label, baseline=baseline,
+                in_repeats=sum(bool(item.fails) and not item.failed for item in self.again.values()),
             ),
             modes=tuple(modes), unrecorded_modes=self._unrecorded,
             neighbourhoods=tuple(known),
@@ -552,7 +553,8 @@ class _Triage:
                 + (self._unharmed() if self._tests else [])
             ),
             repeated=tuple(
-                item.model_copy(update={"mode": of_mode.get(i, 0)}) for i, item in self.again.items()
+                item.model_copy(update={"mode": of_mode.get(i, 0)})
+                for i, item in self.again.items()
             ),
         )  # fmt: skip
 
