@@ -45,72 +45,50 @@ def clopper_pearson(
     return low, high
 
 
-def confidence_sequence(
-    successes: int, trials: int, confidence: float = CONFIDENCE
-) -> tuple[float, float]:
-    """Return an interval that contains a probability with this confidence whenever trials stop.
+def confidence_sequence(successes: int, trials: int) -> tuple[float, float]:
+    """Return a 95 % interval of a probability that holds even if results decide how long to try.
 
-    Clopper's and Pearson's holds for a number of trials that is stated beforehand; this one also
-    where each result decides whether there is another trial, which makes it a little wider. It
-    holds the probabilities whose density, by the results and an even prior, is above 1 −
-    confidence.
-    Source: I. Waudby-Smith and A. Ramdas, Confidence sequences for sampling without replacement,
-    NeurIPS 33 (2020), the prior-posterior ratio; H. Robbins, Ann. Math. Stat. 41 (1970) 1397.
+    It holds the probabilities whose density by these trials, and a prior that is even, exceeds
+    0.05; it is a little wider than Clopper's and Pearson's, for a number of trials that is fixed.
+    Source: the prior-posterior ratio of I. Waudby-Smith and A. Ramdas, NeurIPS 33 (2020).
 
     Args:
         successes: 0 .. trials.
         trials: 0 gives (0, 1).
-        confidence: in (0, 1).
     """
-    if not trials:
-        return 0.0, 1.0
-    failures = trials - successes
-    ways, level = (trials + 1) * math.comb(trials, successes), 1.0 - confidence
-
-    def end(outside: float) -> float:
-        inside = successes / trials
-        for _ in range(60):
-            middle = 0.5 * (inside + outside)
-            if ways * middle**successes * (1.0 - middle) ** failures > level:
-                inside = middle
-            else:
-                outside = middle
-        return inside
-
-    return (end(0.0) if successes else 0.0), (end(1.0) if failures else 1.0)
+    failures, ways = trials - successes, (trials + 1) * math.comb(trials, successes)
+    ends = []
+    for outside, is_open in ((0.0, successes), (1.0, failures)):
+        inside = successes / max(trials, 1) if is_open else outside
+        for _ in range(60 if is_open else 0):
+            p = 0.5 * (inside + outside)
+            in_it = ways * p**successes * (1.0 - p) ** failures > 1.0 - CONFIDENCE
+            inside, outside = (p, outside) if in_it else (inside, p)
+        ends.append(inside)
+    return ends[0], ends[1]
 
 
-def beta_binomial(
-    successes: Sequence[int], trials: Sequence[int], confidence: float = CONFIDENCE
-) -> tuple[float, float, float]:
-    """Return the mean of probabilities that differ from case to case, with an interval.
+def beta_binomial(successes: Sequence[int], trials: Sequence[int]) -> tuple[float, float, float]:
+    """Return the mean of probabilities that differ from case to case, and its 95 % interval.
 
-    Each case has a probability of its own, from one beta distribution; its mean and its spread are
-    a priori even. How long the trials of a case go on may depend on their results.
+    Those of the cases are of one beta distribution, whose mean and correlation have even priors;
+    how long a case was tried may depend on its results.
 
     Args:
         successes: of each case.
         trials: of each case.
-        confidence: of the interval, in (0, 1).
-
-    Returns:
-        The mean of the probabilities, and the ends of its interval.
     """
     from scipy.special import betaln
 
     mean = (np.arange(400) + 0.5)[:, np.newaxis] / 400.0
-    size = 1.0 / ((np.arange(50) + 0.5) / 50.0) - 1.0  # of an even correlation of two trials
+    size = 50.0 / (np.arange(50) + 0.5) - 1.0
     a, b = mean * size, (1.0 - mean) * size
-    log = np.zeros(a.shape)
-    for k, n in zip(successes, trials, strict=True):
-        log += betaln(a + k, b + n - k) - betaln(a, b)
+    counts = zip(successes, trials, strict=True)
+    log = sum((betaln(a + k, b + n - k) - betaln(a, b) for k, n in counts), np.zeros(a.shape))
     weight = np.exp(log - log.max()).sum(axis=1)
-    weight /= weight.sum()
-    miss, below = (1.0 - confidence) / 2.0, np.cumsum(weight)
-    ends = (
-        float(np.interp(share, below, mean[:, 0] + 1.0 / 800.0)) for share in (miss, 1.0 - miss)
-    )
-    return float(weight @ mean[:, 0]), *ends
+    below = np.cumsum(weight / weight.sum())
+    low, high = np.interp([(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0], below, mean[:, 0])
+    return float(weight @ mean[:, 0] / weight.sum()), float(low), float(high)
 
 
 def wilson(successes: int, trials: int) -> tuple[float, float]:

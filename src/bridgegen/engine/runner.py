@@ -244,8 +244,7 @@ class Runner:
                 by default.
             until_collision: whether rows may end where the ego collides, to save time.
             roads: of these rows, all of one storyboard; see ``roads_of``.
-            repeat: which evaluation of the rows it is: in the embedded simulator, a user's driver
-                that takes seeds gets others in each.
+            repeat: which evaluation it is: the embedded simulator gives other seeds in each.
         """
         if roads is not None:
             return self._run(X, fix, noise, roads, until_collision=until_collision, repeat=repeat)

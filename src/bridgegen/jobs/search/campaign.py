@@ -376,6 +376,10 @@ def _finish(
     records_harm = pipeline.objective.harm in pipeline.metrics  # not in runs of earlier versions
     if rule == "criteria" or not records_harm:
         best = _critical_by_objective(rows, settings.keep)
+    repeats = settings.repeats or 1
+    if repeats > 1 and pipeline.repeats:
+        name, repeats = pipeline.driver.label, 1
+        callbacks.warning(f"--repeats: {name} always repeats here, so nothing is evaluated again")
     if records_harm:
         triaged = triage(
             pipeline,
@@ -386,8 +390,8 @@ def _finish(
             chosen=best.tolist() if rule == "criteria" else None,
             effort=effort(settings.triage),
             domain=store.domain,
-            repeats=_repeats(pipeline, settings, callbacks),
-            known=_known_repeats(store, rows),
+            repeats=repeats,
+            known=_known_repeats(store, rows) if repeats > 1 else (),
         )
         if rule != "criteria":
             best = np.array(triaged.exports, dtype=np.int64)
@@ -411,25 +415,13 @@ def _finish(
     return run
 
 
-def _repeats(pipeline: Pipeline, settings: Settings, callbacks: SearchCallbacks) -> int:
-    """Return how often findings are evaluated again: never where it is known that they repeat."""
-    most = settings.repeats or 1
-    if most > 1 and pipeline.repeats:
-        callbacks.warning(
-            f"nothing is evaluated again (--repeats {most}): {pipeline.driver.label} in the "
-            "embedded simulator gives the same result each time"
-        )
-        return 1
-    return most
-
-
-def _known_repeats(store: Store, rows: Recorded) -> dict[int, Repeated]:
-    """Return the repeats that an earlier triage of these rows has recorded, by evaluation."""
+def _known_repeats(store: Store, rows: Recorded) -> tuple[Repeated, ...]:
+    """Return the repeats that an earlier triage of these rows has recorded."""
     try:
         record = read_record(store.folder / JSON_FILE, rows.digest())
     except BridgeGenError:  # damaged, or of fewer rows: it is written anew
         record = None
-    return {item.evaluation: item for item in record.repeated} if record else {}
+    return record.repeated if record else ()
 
 
 def _extrapolated(

@@ -68,7 +68,7 @@ class KnownFailures:
     def standing(self, entry_result: EntryResult, row: RowResult) -> Standing:
         """Return how a variation of an entry stands."""
         verdict = row.verdict
-        if verdict not in ("failed", "flaky"):
+        if verdict != "failed" and verdict != "flaky":
             return verdict
         found = self.failures.get(entry_result.entry)
         if found is None:

@@ -4,7 +4,7 @@ Every list has a limit, so that the size of the record does not depend on the le
 """
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -250,26 +250,19 @@ class Repeated(_Model):
 
     Attributes:
         evaluation: its number.
-        repeats: further evaluations that have a verdict; the first, by which it was chosen, is none
-            of them.
+        failed: whether it did. It was chosen for that, so it is not counted itself.
+        repeats: further evaluations that have a verdict.
         fails: of them.
-        lost: further ones without a verdict: no result, or implausible traffic.
-        failed: whether the first evaluation did.
+        lost: further ones without a result, or with implausible traffic.
         mode: number of the failure mode that it is of; 0 of none.
     """
 
     evaluation: Count
-    repeats: Count
-    fails: Count
-    lost: Count = 0
     failed: bool = False
+    repeats: Count = 0
+    fails: Count = 0
+    lost: Count = 0
     mode: Count = 0
-
-    @model_validator(mode="after")
-    def _consistent(self) -> "Repeated":
-        if self.fails > self.repeats:
-            raise ValueError("no more repeats may fail than there are")
-        return self
 
     @property
     def probability(self) -> float:
@@ -277,15 +270,9 @@ class Repeated(_Model):
         return (self.fails + 1.0) / (self.repeats + 2.0)
 
     @property
-    def interval(self) -> tuple[float, float]:
-        """Its 95 % interval, which holds whenever the repeats are stopped."""
-        return confidence_sequence(self.fails, self.repeats)
-
-    @property
     def decided(self) -> bool:
         """Whether it is known, with 95 %, that it fails more often than not, or less often."""
-        low, high = self.interval
-        return low > 0.5 or high < 0.5
+        return repeats_needed(self.fails, self.repeats) == self.repeats
 
     @property
     def agrees(self) -> bool:
@@ -295,41 +282,23 @@ class Repeated(_Model):
     @property
     def sentence(self) -> str:
         """The result in words."""
-        return repeats_sentence(self.fails, self.repeats, self.lost)
-
-    def facts(self) -> dict[str, object]:
-        """Return all of it as JSON's types."""
-        low, high = self.interval
-        return self.model_dump(include={"fails", "repeats", "lost"}) | {
-            "p_fail": self.probability,
-            "low": low,
-            "high": high,
-            "needed": repeats_needed(self.fails, self.repeats),
-            "sentence": self.sentence,
-        }
+        lost = f", {self.lost} more without a result" if self.lost else ""
+        return repeats_sentence(self.fails, self.repeats) + lost
 
 
-def repeats_sentence(fails: int, repeats: int, lost: int = 0) -> str:
+def repeats_sentence(fails: int, repeats: int) -> str:
     """Return how many repeats fail, in words, with P(fail) and its interval."""
-    parts = ["has no repeat with a verdict"]
-    if repeats:
-        low, high = confidence_sequence(fails, repeats)
-        parts = [
-            f"fails in {fails} of {repeats} repeats (P {(fails + 1) / (repeats + 2):.2f}, 95 %: "
-            f"{low:.2f} to {high:.2f})"
-        ]
-    return ", ".join([*parts, *([f"{lost} without a verdict"] if lost else [])])
-
-
-MOST_NEEDED = 1000
+    low, high = confidence_sequence(fails, repeats)
+    mean = (fails + 1.0) / (repeats + 2.0)
+    return f"fails in {fails} of {repeats} repeats (P {mean:.2f}, 95 %: {low:.2f} to {high:.2f})"
 
 
 def repeats_needed(fails: int, repeats: int) -> int | None:
-    """Return how many repeats show at 95 % whether it mostly fails, if this share of them fails.
+    """Return how many repeats tell at 95 % whether it mostly fails, if this share of them fails.
 
-    None: more than `MOST_NEEDED`, since about half of them fail; or there are none yet.
+    None: more than 1,000, since about half of them fail; or there are none yet.
     """
-    for n in range(max(repeats, 1), MOST_NEEDED + 1 if repeats else 0):
+    for n in range(max(repeats, 1), 1001 if repeats else 0):
         low, high = confidence_sequence(round(fails / repeats * n), n)
         if low > 0.5 or high < 0.5:
             return n
@@ -664,14 +633,10 @@ class Triage(_Model):
         return next((item for item in self.repeated if item.evaluation == evaluation), None)
 
     def chance(self, mode: Mode) -> tuple[float, float, float] | None:
-        """Return P(fail | scenario) of a mode's repeated rows: their mean, and its 95 % interval.
-
-        None where none was repeated.
-        """
+        """Return P(fail | scenario) of a mode's repeated rows: the mean, and its 95 % interval."""
         some = [item for item in self.repeated if item.mode == mode.number and item.repeats]
-        if not some:
-            return None
-        return beta_binomial([item.fails for item in some], [item.repeats for item in some])
+        fails, repeats = [item.fails for item in some], [item.repeats for item in some]
+        return beta_binomial(fails, repeats) if some else None
 
     def doubts(self, evaluation: int) -> str:
         """Return what makes the verdict on an evaluation doubtful; "" if nothing is known to."""
@@ -705,7 +670,7 @@ def write_record(folder: Path, triage: Triage) -> Path:
     """
     path = folder / JSON_FILE
     # Without repeats the record is as it was before there were any.
-    unused = None if triage.repeated else {"repeated": True, "bound": {"in_repeats"}}
+    unused: Any = None if triage.repeated else {"repeated": True, "bound": {"in_repeats"}}
     write_whole(path, [triage.model_dump_json(indent=1, exclude=unused).encode(), b"\n"])
     return path
 

@@ -60,7 +60,7 @@ from bridgegen.search.triage.record import (
     StepCheck,
     Triage,
 )
-from bridgegen.search.triage.repeats import Known, nearest_misses, repeated
+from bridgegen.search.triage.repeats import repeated
 from bridgegen.search.triage.time_steps import step_checks
 from bridgegen.search.triage.what_happened import COPY, apart, distinct, of_events, of_results
 
@@ -94,7 +94,7 @@ def triage(
     effort: Effort = FULL,
     domain: str = "",
     repeats: int = 1,
-    known: Known | None = None,
+    known: Sequence[Repeated] = (),
 ) -> Triaged:
     """Group a run's harmful rows into failure modes, and test the robustness of each finding.
 
@@ -112,10 +112,10 @@ def triage(
         domain: a sentence if the driver is not made for the scenario.
         repeats: how often a finding is evaluated again at most, to estimate how likely it fails; 1:
             not at all.
-        known: repeats of an earlier triage of the same run, by evaluation.
+        known: repeats of an earlier triage of the same run.
     """
     made = _Triage(pipeline, rows, algorithm, seed, keep, chosen, effort, domain)
-    made.repeats, made.again = repeats, dict(known or {})
+    made.repeats, made.again = repeats, {item.evaluation: item for item in known}
     return made.run()
 
 
@@ -292,20 +292,18 @@ class _Triage:
 
     def _repeat(self, exports: Sequence[int], shown: Sequence[int], harm: Float) -> list[int]:
         """Evaluate findings again; return the rows to export, the likeliest and worst first."""
-        rows, chosen = self._rows, self._chosen
+        rows, chosen = self._rows, self._chosen or ()
         some = self._at[list(dict.fromkeys([*exports, *shown, *self._found]))].tolist()
-        failed = np.isin(np.arange(len(rows.id)), [*self._at, *(chosen or ())])
+        failed = np.isin(np.arange(len(rows.id)), [*self._at, *chosen])
         # What passed once may fail: those that came nearest, so that no flaky one is called safe.
-        valid = (rows.status == 0) & ~_implausible(rows)
-        beside = nearest_misses(self._harm, failed, valid, self._keep)
-        at = np.array(list(dict.fromkeys([*(chosen or ()), *some, *beside])), dtype=np.int64)
-        X, ids = rows.X[at], rows.id[at]
-        self.again = repeated(
-            self._pipeline, X, ids, self.repeats, failed[at], self._fails, self.again
-        )
-        if chosen is not None:
-            return list(exports)
-        return sorted(exports, key=lambda i: -self._chance([i]) * float(harm[i]))
+        passed = np.flatnonzero((rows.status == 0) & ~_implausible(rows) & ~failed)
+        beside = passed[np.argsort(-self._harm[passed], kind="stable")][: self._keep].tolist()
+        at = list(dict.fromkeys([*chosen, *some, *beside]))
+        ids = zip(rows.id[at].tolist(), failed[at].tolist(), strict=True)
+        first = [self.again.get(i) or Repeated(evaluation=i, failed=has) for i, has in ids]
+        self.again = repeated(self._pipeline, rows.X[at], first, self.repeats, self._fails)
+        key = {i: -self._chance([i]) * float(harm[i]) for i in exports}
+        return list(exports) if chosen else sorted(exports, key=key.__getitem__)
 
     def _fails(self, evaluation: Evaluation) -> Bool:
         """Return which rows of an evaluation fail: by harm, or by what else chooses exports."""
@@ -314,16 +312,13 @@ class _Triage:
 
     def _chance(self, some: Sequence[int]) -> float:
         """Return P(fail) of the repeated ones of some harmful rows, on average; 1 without any."""
-        ids = self._rows.id[self._at[np.array(some, dtype=np.int64)]].tolist()
+        ids = self._rows.id[self._at[list(some)]].tolist()
         known = [self.again[i].probability for i in ids if i in self.again]
         return sum(known) / len(known) if known else 1.0
 
     def _risk(self, item: Group, i: int) -> tuple[float, float]:
-        """Return the sort key of modes by P(fail) × severity × exposure; equal ones by harm.
-
-        Exposure is how often the weather of the row that stands for it is met. It is not the share
-        of the space that fails: one evaluation of each draw contains P(fail) already.
-        """
+        """Return the sort key of modes by P(fail) × severity × exposure; equal ones by harm."""
+        # Exposure: how often its weather is met. A share of the space contains P(fail) already.
         bands = self._space.bands(self._space.values(self._rows.X[self._at[i]]))
         likely = self._chance(item.rows.tolist()) * math.exp(-surprise(bands))
         return -likely * self._severity(item), -likely * float(self._harm[self._at[i]])
@@ -511,7 +506,8 @@ class _Triage:
                     minimal=minimal[k - 1],
                 )
             )
-        of_mode = {i: k for k, g in enumerate(groups, 1) for i in ids[g.rows].tolist()}
+        of = {i: {"mode": k} for k, g in enumerate(groups, 1) for i in ids[g.rows].tolist()}
+        again = [item.model_copy(update=of.get(i, {})) for i, item in self.again.items()]
         ok = rows.status == 0
         implausible = _implausible(rows)
         known = [self._found[i] for i in dict.fromkeys([*tested, *sample]) if i in self._found]
@@ -537,7 +533,7 @@ class _Triage:
                     rows.metrics, pipeline.metrics, self._harm, rows.id, ok & ~implausible,
                 ),
                 modes=len(modes), ego=pipeline.driver.label, baseline=baseline,
-                in_repeats=sum(bool(item.fails) and not item.failed for item in self.again.values()),
+                in_repeats=sum(item.fails > 0 and not item.failed for item in again),
             ),
             modes=tuple(modes), unrecorded_modes=self._unrecorded,
             neighbourhoods=tuple(known),
@@ -552,10 +548,7 @@ class _Triage:
                 ]
                 + (self._unharmed() if self._tests else [])
             ),
-            repeated=tuple(
-                item.model_copy(update={"mode": of_mode.get(i, 0)})
-                for i, item in self.again.items()
-            ),
+            repeated=tuple(again),
         )  # fmt: skip
 
     def _avoids(self, at: Int) -> Bool:

@@ -50,31 +50,21 @@ def repeats_in_words(mode: Mode, found: Triage) -> str:
     if again is None or chance is None:
         return ""
     rows = sum(item.mode == mode.number for item in found.repeated)
-    mean, low, high = chance
-    text = f"{again.sentence}"
-    if rows > 1 and not all(item.agrees for item in found.repeated if item.mode == mode.number):
-        text += f"; its {rows} repeated rows: P {mean:.2f} (95 %: {low:.2f} to {high:.2f})"
-    return text
+    of_all = "of {} rows P {:.2f}, 95 %: {:.2f} to {:.2f}".format(rows, *chance)
+    return f"{again.sentence}; {of_all}" if rows > 1 else again.sentence
 
 
 def all_repeats_in_words(found: Triage) -> str:
     """Return how many evaluations repeat their verdict, in words; "" if none was made again."""
-    again = [item for item in found.repeated if item.repeats]
-    if not found.repeated:
-        return ""
-    changed, parts = [item for item in again if not item.agrees], []
-    if not changed:
-        parts.append(f"all {len(again)} scenarios that were evaluated again keep their verdict")
-    else:
-        parts.append(
-            f"{len(changed)} of {len(again)} scenarios that were evaluated again change their "
-            "verdict: the driver does not repeat"
-        )
-    if passed := sum(not item.failed for item in changed):
-        parts.append(f"{passed} of these passed at first")
-    if lost := sum(item.lost for item in found.repeated):
-        parts.append(f"{lost} repeats without a verdict")
-    return "; ".join(parts)
+    again, lost = len(found.repeated), sum(item.lost for item in found.repeated)
+    changed = [item for item in found.repeated if not item.agrees]
+    passed = sum(not item.failed for item in changed)
+    text = f"all {again} scenarios that were evaluated again keep their verdict"
+    if changed:
+        text = f"{len(changed)} of {again} scenarios that were evaluated again change their verdict"
+        text += f" ({passed} passed at first)" if passed else ""
+    text += f"; {lost} repeats without a result" if lost else ""
+    return text if again else ""
 
 
 def steps_in_words(found: Triage) -> str:
