@@ -191,10 +191,7 @@ def compiled_driver(
         raise InputError(f"memory must be a whole number >= 0, got {memory!r}")
     words = checked_wants(wants)
     if "seed" in words:
-        raise InputError(
-            "a compiled driver is given no seed: all that it keeps is its memory, so it repeats; "
-            "leave 'seed' out of wants"
-        )
+        raise InputError("a compiled driver is given no seed: leave 'seed' out of wants")
     return lambda function: CompiledDriver(function, memory, words)
 
 

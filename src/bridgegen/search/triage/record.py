@@ -3,6 +3,7 @@
 Every list has a limit, so that the size of the record does not depend on the length of the run.
 """
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -272,7 +273,7 @@ class Repeated(_Model):
     @property
     def decided(self) -> bool:
         """Whether it is known, with 95 %, that it fails more often than not, or less often."""
-        return repeats_needed(self.fails, self.repeats) == self.repeats
+        return is_decided(self.fails, self.repeats)
 
     @property
     def agrees(self) -> bool:
@@ -298,11 +299,13 @@ def repeats_needed(fails: int, repeats: int) -> int | None:
 
     None: more than 1,000, since about half of them fail; or there are none yet.
     """
-    for n in range(max(repeats, 1), 1001 if repeats else 0):
-        low, high = confidence_sequence(round(fails / repeats * n), n)
-        if low > 0.5 or high < 0.5:
-            return n
-    return None
+    numbers = range(repeats, 1001 if repeats else 0)
+    return next((n for n in numbers if is_decided(round(fails / repeats * n), n)), None)
+
+
+def is_decided(fails: int, repeats: int) -> bool:
+    """Whether 0.5 lies outside the interval of `confidence_sequence`."""
+    return 20 * (repeats + 1) * math.comb(repeats, fails) <= 2**repeats
 
 
 def _kind(one: AtStep) -> str:

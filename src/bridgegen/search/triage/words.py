@@ -56,15 +56,13 @@ def repeats_in_words(mode: Mode, found: Triage) -> str:
 
 def all_repeats_in_words(found: Triage) -> str:
     """Return how many evaluations repeat their verdict, in words; "" if none was made again."""
-    again, lost = len(found.repeated), sum(item.lost for item in found.repeated)
-    changed = [item for item in found.repeated if not item.agrees]
+    again, lost = [i for i in found.repeated if i.repeats], sum(i.lost for i in found.repeated)
+    changed = [item for item in again if not item.agrees]
     passed = sum(not item.failed for item in changed)
-    text = f"all {again} scenarios that were evaluated again keep their verdict"
-    if changed:
-        text = f"{len(changed)} of {again} scenarios that were evaluated again change their verdict"
-        text += f" ({passed} passed at first)" if passed else ""
+    text = f"{len(changed) or 'none'} of {len(again)} scenarios that were evaluated again change "
+    text += f"their verdict{f' ({passed} passed at first)' if passed else ''}"
     text += f"; {lost} repeats without a result" if lost else ""
-    return text if again else ""
+    return text if found.repeated else ""
 
 
 def steps_in_words(found: Triage) -> str:
