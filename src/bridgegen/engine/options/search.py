@@ -416,10 +416,9 @@ class SearchOptions(CommonOptions):
         default=None,
         metadata=option(
             WHOLE,
-            "How often findings are evaluated again, at most, if driver or simulator may not "
-            "repeat: how likely each fails, with an interval.",
-            hint="8 at least tell whether it mostly fails.",
-            shown="1: never again",
+            "How often findings of a search are evaluated again, at most, or each variation of a "
+            "suite is run, if driver or simulator may not repeat: how likely each fails.",
+            shown="1",
             limits=(1, MAX_REPEATS),
             before=None,
             group=OF_DRIVER,

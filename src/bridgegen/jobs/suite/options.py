@@ -9,7 +9,7 @@ from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.forms import FLAG, PATH, TEXT, WHOLE
 from bridgegen.engine.options.forms import SIMULATOR as CHOICE
 from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, SIMULATOR, WHAT, option
-from bridgegen.engine.options.search import MAX_BUDGET, MAX_REPEATS, OF_ODD, SearchOptions
+from bridgegen.engine.options.search import MAX_BUDGET, OF_ODD, SearchOptions
 from bridgegen.jobs.frame import DRIVERS, SCENARIOS, Job, SimulatingOptions
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 
@@ -55,17 +55,7 @@ class ScenariosOptions(SimulatingOptions):
     vehicle: str | None = field(default=None, metadata=_of_search("vehicle"))
     others: str | None = field(default=None, metadata=_of_search("others"))
     time_limit: float | None = field(default=None, metadata=_of_search("time_limit"))
-    repeats: int | None = field(
-        default=None,
-        metadata=option(
-            WHOLE,
-            "How often each variation is evaluated, if driver or simulator may not repeat: one "
-            "whose verdicts disagree is flaky.",
-            shown="1",
-            limits=(1, MAX_REPEATS),
-            group=DRIVER,
-        ),
-    )
+    repeats: int | None = field(default=None, metadata=_of_search("repeats"))
     criteria: Sequence[Mapping[str, str | Sequence[str]]] = field(
         default=(), metadata=_of_search("criteria")
     )

@@ -78,13 +78,8 @@ class Motion:
     twin: Playback | None = None
 
 
-_LETTER: dict[Verdict, str] = {
-    "passed": "p",
-    "failed": "f",
-    "not run": "n",
-    "not judged": "u",
-    "flaky": "y",
-}
+_LETTER: dict[Verdict, str] = {"passed": "p", "failed": "f", "not run": "n", "not judged": "u"}
+_LETTER["flaky"] = "y"
 _OUTCOME: dict[Outcome | None, str] = {
     "avoided": "a",
     "mitigated": "m",

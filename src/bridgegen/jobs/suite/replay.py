@@ -155,7 +155,12 @@ def _of_file(job: Job, pipeline: Pipeline, file: Path) -> EntryResult:
 
 def _moves_alike(row: RowResult, exported: EntryResult) -> bool:
     """Return whether results are equal but for values, clauses and the rule of what is critical."""
-    bare = {"x": [], "critical": False, "clauses": ""}  # a file states neither rule nor clauses
+    bare = {
+        "x": [],
+        "critical": False,
+        "clauses": "",
+        "fails": 0,
+    }  # a file states neither rule nor clauses
     rows = exported.rows
     return len(rows) == 1 and rows[0].model_copy(update=bare) == row.model_copy(update=bare)
 

@@ -168,9 +168,7 @@ def headline(results: Sequence[EntryResult], label: str) -> str:
     partly = sum(result.verdict == "not run" and result.count("passed") > 0 for result in results)
     unjudged = number["not judged"]
     said = [f"{unjudged:,} {'is' if unjudged == 1 else 'are'} not judged"] if unjudged else []
-    said += [f"{number['flaky']:,} {'is' if number['flaky'] == 1 else 'are'} flaky"] * bool(
-        number["flaky"]
-    )
+    said += [f"{number['flaky']:,} flaky"] if number["flaky"] else []
     lost = [f"{number['not run'] - partly:,} did not run"] if number["not run"] > partly else []
     lost += [f"{partly:,} ran only in part"] if partly else []
     return "; ".join([words, *said, *lost])

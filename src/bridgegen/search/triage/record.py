@@ -271,11 +271,6 @@ class Repeated(_Model):
         return (self.fails + 1.0) / (self.repeats + 2.0)
 
     @property
-    def decided(self) -> bool:
-        """Whether it is known, with 95 %, that it fails more often than not, or less often."""
-        return is_decided(self.fails, self.repeats)
-
-    @property
     def agrees(self) -> bool:
         """Whether all repeats have the verdict of the first evaluation."""
         return self.fails == self.repeats * self.failed
@@ -304,7 +299,7 @@ def repeats_needed(fails: int, repeats: int) -> int | None:
 
 
 def is_decided(fails: int, repeats: int) -> bool:
-    """Whether 0.5 lies outside the interval of `confidence_sequence`."""
+    """Whether it is known at 95 % if it mostly fails: 0.5 is not in `confidence_sequence`."""
     return 20 * (repeats + 1) * math.comb(repeats, fails) <= 2**repeats
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.search.triage.record import Repeated
+from bridgegen.search.triage.record import Repeated, is_decided
 
 
 def repeated(
@@ -42,7 +42,7 @@ def repeated(
             item = found[k]
             counts = {"fails": item.fails + (has and fail), "lost": item.lost + (not has)}
             found[k] = item.model_copy(update=counts | {"repeats": item.repeats + has})
-        left = [k for k in left if not found[k].decided]
+        left = [k for k in left if not is_decided(found[k].fails, found[k].repeats)]
         if not left:
             break
     return {item.evaluation: item for item in found}
