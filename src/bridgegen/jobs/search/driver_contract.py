@@ -121,10 +121,9 @@ def check_driver(
     yield from _in_short(done)
     if counts.any():
         changed, of = counts.tolist()
-        told = "by its seed" if seeded else "does not repeat"
-        told += f": {changed} of {of} scenarios change their verdict"
-        advice = "search and suite with --repeats 10 tell how likely each fails"
-        yield Check("in short", "verdicts", figure=f"{told}; {advice}")
+        told = f"{changed} of {of} scenarios change their verdict; use --repeats 10"
+        why = "by its seed" if seeded else "does not repeat"
+        yield Check("in short", "verdicts", figure=f"{why}: {told}")
 
 
 def described(spec: str, pipeline: Pipeline) -> str:

@@ -94,14 +94,10 @@ class RowResult(Strict):
         verdicts = [row.verdict for row in tries]
         worst = next(name for name in (*WORST, "passed") if name in verdicts)
         row, fails = tries[verdicts.index(worst)], verdicts.count("failed")
-        problem = f"{verdicts.count(worst)} of {len(tries)} repeats: {row.problem}"
-        return row.model_copy(
-            update={
-                "repeats": fails + verdicts.count("passed"),
-                "fails": fails,
-                "problem": problem if row.problem else "",
-            }
-        )
+        counts: dict[str, Any] = {"repeats": fails + verdicts.count("passed"), "fails": fails}
+        if row.problem:
+            counts["problem"] = f"{verdicts.count(worst)} of {len(tries)} repeats: {row.problem}"
+        return row.model_copy(update=counts)
 
     @property
     def flaky(self) -> str:

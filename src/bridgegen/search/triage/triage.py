@@ -175,10 +175,8 @@ class _Triage:
     def _counted(self, rows: Rows | Recorded | Evaluation) -> tuple[Bool, Float]:
         """Return which rows are a failure that counts in this run, and the harm of each."""
         pipeline = self._pipeline
-        name = pipeline.objective.harm
-        harmful, harm = harmful_rows(
-            rows.metrics, pipeline.metrics, name, rows.status, rows.findings
-        )
+        of = rows.metrics, pipeline.metrics, pipeline.objective.harm, rows.status, rows.findings
+        harmful, harm = harmful_rows(*of)
         # A search for one cause has found only what is critical for it.
         if pipeline.cause is not None:  # harm of another cause does not count
             harmful &= rows.critical
@@ -506,8 +504,8 @@ class _Triage:
                     minimal=minimal[k - 1],
                 )
             )
-        of = {i: {"mode": k} for k, g in enumerate(groups, 1) for i in ids[g.rows].tolist()}
-        again = [item.model_copy(update=of.get(i, {})) for i, item in self.again.items()]
+        of = {i: k for k, g in enumerate(groups, 1) for i in ids[g.rows].tolist()}
+        again = [item.model_copy(update={"mode": of.get(i, 0)}) for i, item in self.again.items()]
         ok = rows.status == 0
         implausible = _implausible(rows)
         known = [self._found[i] for i in dict.fromkeys([*tested, *sample]) if i in self._found]
