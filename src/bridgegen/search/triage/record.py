@@ -300,7 +300,7 @@ def repeats_needed(fails: int, repeats: int) -> int | None:
 
 def is_decided(fails: int, repeats: int) -> bool:
     """Whether it is known at 95 % if it mostly fails: 0.5 is not in `confidence_sequence`."""
-    return 20 * (repeats + 1) * math.comb(repeats, fails) <= 2**repeats
+    return 20 * (repeats + 1) * math.comb(repeats, fails) <= 1 << repeats
 
 
 def _kind(one: AtStep) -> str:

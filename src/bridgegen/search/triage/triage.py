@@ -572,6 +572,10 @@ class _Triage:
                 self._found[i] = near.model_copy(update={"judgement": text})
 
     def _judgement(self, i: int, cause: str) -> str:
+        if cause == "sensitive" and self._is_flaky(i):  # its parameters need not change for that
+            again = self.again[int(self._rows.id[self._at[i]])]
+            passes = f"{again.repeats - again.fails} of {again.repeats} repeats"
+            return f"root cause not known: the same scenario passes in {passes}"
         return judgement(
             cause,
             self._found.get(i),

@@ -95,6 +95,9 @@ def robustness_in_words(mode: Mode, found: Triage) -> str:
     if near is None or not near.rows:
         return f"also fails in {percent(mode.robustness)} of its nearby scenarios"
     if mode.knife_edge:
+        again = found.of_repeats(mode.shown)
+        if again is not None and not again.agrees:  # no edge: it passes without any change
+            return f"fails in {near.harmful} of {near.rows} nearby scenarios"
         return f"knife-edge: fails in only {near.harmful} of {near.rows} nearby scenarios"
     share = "all " if near.harmful == near.rows else f"{near.harmful} of "
     return f"also fails in {share}{near.rows} nearby scenarios"
