@@ -82,8 +82,8 @@ def test_the_options_of_a_search_are_in_groups(cli, monkeypatch):
     assert max(len(line) for line in out.splitlines()) <= 80
     driver = out.partition("\nDriver:\n")[2].partition("\nSimulator:\n")[0]
     assert re.findall(r"^  (--[a-z-]+)", driver, re.MULTILINE) == [
-        "--adversary", "--others", "--ego", "--name", "--ideal", "--vehicle", "--worse-than",
-        "--time-limit",
+        "--repeats", "--adversary", "--others", "--ego", "--name", "--ideal", "--vehicle",
+        "--worse-than", "--time-limit",
     ]  # fmt: skip
     assert re.findall(r"^  (--[a-z-]+)", out.partition("\nOptions:\n")[2], re.MULTILINE) == [
         "--help"

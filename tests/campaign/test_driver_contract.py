@@ -107,6 +107,16 @@ def test_a_driver_that_is_not_deterministic_is_found_out(name):
     assert in_short(checks)["free of cross-talk"] == "not known"
 
 
+def test_verdicts_that_change_are_counted(monkeypatch):
+    monkeypatch.setattr(driver_contract, "JUDGED", 12)
+    for name, said in (("Flips", "does not repeat"), ("FlipsBySeed", "by its seed")):
+        checks = checked(name, Path(__file__).with_name("flips.py"), CUT_IN)
+        figure = in_short(checks)["verdicts"]
+        assert re.match(rf"{said}: \d+ of 12 scenarios change their verdict; ", figure), figure
+        assert "--repeats 10" in figure
+        assert any(check.problem for check in checks) == (name == "Flips")
+
+
 def test_a_driver_that_is_another_one_in_another_process_is_found_out():
     assert {*broken("IsBornByChance")} == {"so it does in a new process"}
 

@@ -49,7 +49,7 @@ def test_a_record_is_read_and_written_as_it_was():
     assert settings.to_dict() == RECORDED | {
         name: list(one) if isinstance(one, tuple) else one
         for name, one in DEFAULTS_BEFORE_FIELD.items()
-        if name in NEWER and name not in ("odd", "rate", "exposure")  # where they are given
+        if name in NEWER and name not in ("odd", "rate", "exposure", "repeats")  # where given
     } | {"driver_digest": ""}
     assert (settings.budget, settings.settings["w"], settings.road_map) == (
         60,

@@ -190,6 +190,8 @@ def compiled_driver(
     if not isinstance(memory, int) or memory < 0:
         raise InputError(f"memory must be a whole number >= 0, got {memory!r}")
     words = checked_wants(wants)
+    if "seed" in words:
+        raise InputError("a compiled driver is given no seed: leave 'seed' out of wants")
     return lambda function: CompiledDriver(function, memory, words)
 
 

@@ -46,6 +46,7 @@ WANTS = {
     "map": "the road network: lanes, markings, crosswalks, lights; the part of it around the ego",
     "conflicts": "where the ways of others meet the route, and who gives way there",
     "history": "the tracks of the last second",
+    "seed": "a seed for each scenario's random numbers; another one in each repeat (--repeats)",
 }
 """Inputs that a driver may ask for by its attribute ``wants``, with descriptions."""
 
@@ -68,6 +69,8 @@ class Scene:
         max_curvature: of its path at full lock [1/m].
         maps: of the R road networks of the batch, if the driver wants "map"; else empty.
         map_of: ``(N,)`` int64, which of them each scenario has; empty if it does not.
+        seed: ``(N,)`` int64, 0 .. 2**32 - 1, of each scenario's random numbers, if the driver wants
+            "seed"; else empty.
     """
 
     time_step: float
@@ -83,6 +86,7 @@ class Scene:
     max_curvature: float
     maps: tuple["RoadMap", ...] = ()
     map_of: Int = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    seed: Int = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,20 @@ def noise_key(values: Mapping[str, npt.ArrayLike], n_rows: int) -> npt.NDArray[n
     return key
 
 
+def driver_seeds(keys: npt.NDArray[np.uint64], repeat: int = 0) -> npt.NDArray[np.int64]:
+    """Return the seeds of a user's driver in N rows, ``(N,)`` in 0 .. 2**32 − 1.
+
+    They follow from the rows alone, as their noise does: so a row is driven alike in a search, in a
+    suite and from its exported file.
+
+    Args:
+        keys: ``(N,)``, see `noise_key`.
+        repeat: which evaluation of the rows it is; 0 is the first.
+    """
+    word = np.uint64(int.from_bytes(b"a driver", "little"))
+    return (_mix(_mix(keys ^ word) + np.uint64(repeat)) >> np.uint64(32)).astype(np.int64)
+
+
 def _mix(word: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
     word = word + _GOLDEN
     word = (word ^ (word >> _SHIFT_1)) * _MIX_1

@@ -364,13 +364,15 @@ class Pipeline:
         batch.compile_instants()
         analyse(batch.standing())
 
-    def evaluate(self, X: Float) -> Evaluation:
+    def evaluate(self, X: Float, repeat: int = 0) -> Evaluation:
         """Evaluate N rows; a row's result depends on that row alone.
 
         Args:
             X: ``(N, len(space.names))`` float64, feasible rows.
+            repeat: which evaluation of them it is; see `Runner.run`. After the first one, 0, no
+                causes are sought, unless only one counts.
         """
-        return self._joined(self._map(type(self).evaluate_rows, X, self.objective))
+        return self._joined(self._map(type(self).evaluate_rows, X, self.objective, repeat))
 
     def stream(self) -> "EvaluationStream":
         """Return what evaluates rows while its caller does something else."""
@@ -386,20 +388,26 @@ class Pipeline:
             ]
         )
 
-    def evaluate_rows(self, X: Float, objective: Objective) -> Evaluation:
+    @property
+    def repeats(self) -> bool:
+        """Whether it is known that a row's result is the same each time: all that moves is ours."""
+        own = self.driver.is_own or (self.baseline is not None and not self.baseline.repeats)
+        return not own and self.tries
+
+    def evaluate_rows(self, X: Float, objective: Objective, repeat: int = 0) -> Evaluation:
         """Evaluate N rows at once, in this thread; ``evaluate`` shares them among workers."""
         return Evaluation.gathered(
             [
-                (at, self._evaluate(runner, X[at], objective))
+                (at, self._evaluate(runner, X[at], objective, repeat))
                 for at, runner in self.runner.by_variant(X)
             ]
         )
 
-    def _evaluate(self, runner: Runner, X: Float, objective: Objective) -> Evaluation:
+    def _evaluate(self, runner: Runner, X: Float, objective: Objective, repeat: int) -> Evaluation:
         """Evaluate N rows of one storyboard."""
         # Once: the rollouts by which causes are found take place on the same roads.
         roads, rows = runner.roads_of(X)
-        rollout = runner.run(X, roads=(roads, rows))
+        rollout = runner.run(X, roads=(roads, rows), repeat=repeat)
         metrics = self.measure(rollout)
         gate = plausibility(rollout)
         texts = happened(rollout, may_stop=self.is_protocol)
@@ -409,11 +417,11 @@ class Pipeline:
         critical = objective.critical(metrics, self.metrics) & ok
         found = Evaluation(metrics, F, critical, rollout.status, findings, rollout.messages)
         if self.baseline is not None:
-            other = self.baseline.evaluate_rows(X, objective)
+            other = self.baseline.evaluate_rows(X, objective, repeat)
             found = difference(
                 found, self.metrics, other, self.baseline.metrics, gated=objective.gated
             )
-        if not self.seeks_causes:
+        if not self.seeks_causes or (repeat and self.cause is None):
             return found
 
         def harmless(at: Int, fix: Counterfactual) -> Bool:

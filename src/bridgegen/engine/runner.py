@@ -233,6 +233,7 @@ class Runner:
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
         roads: Roads | None = None,
+        repeat: int = 0,
     ) -> Rollout:
         """Roll out N rows; a row's result depends on that row alone.
 
@@ -243,13 +244,15 @@ class Runner:
                 by default.
             until_collision: whether rows may end where the ego collides, to save time.
             roads: of these rows, all of one storyboard; see ``roads_of``.
+            repeat: which evaluation it is: the embedded simulator gives other seeds in each.
         """
         if roads is not None:
-            return self._run(X, fix, noise, roads, until_collision=until_collision)
+            return self._run(X, fix, noise, roads, until_collision=until_collision, repeat=repeat)
         parts = []
         for at, runner in self.by_variant(X):
             keys = None if noise is None else noise[at]
-            parts.append((at, runner._run(X[at], fix, keys, until_collision=until_collision)))
+            found = runner._run(X[at], fix, keys, until_collision=until_collision, repeat=repeat)
+            parts.append((at, found))
         return joined(parts)
 
     def _run(
@@ -260,6 +263,7 @@ class Runner:
         roads: Roads | None = None,
         *,
         until_collision: bool,
+        repeat: int,
     ) -> Rollout:
         """Roll out N rows of one storyboard."""
         # A refused row gets a rollout with a status: its values are a result of the search, not an
@@ -274,6 +278,8 @@ class Runner:
             return embedded.run(
                 networks, rows, columns, noise=noise, until_collision=early, **_changed(fix)
             )
+        if repeat and self.simulator is embedded:
+            return embedded.run(networks, rows, columns, repeat=repeat, **_changed(fix))
         if fix is None:
             return self.simulator.run(networks, rows, columns)
         return self.simulator.run(networks, rows, columns, driver=fix.driver, dry=fix.dry)

@@ -9,7 +9,12 @@ from bridgegen.pages.playback import Conflict
 from bridgegen.search.triage.influence import ends_in_words
 from bridgegen.search.triage.judgement import judgement
 from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
-from bridgegen.search.triage.words import covered_in_words, step_in_words, steps_in_words
+from bridgegen.search.triage.words import (
+    covered_in_words,
+    repeats_in_words,
+    step_in_words,
+    steps_in_words,
+)
 
 FINDING_FIELDS = ("conflict", "conflict_type", "responsible", "rule", "partner")
 """The fields of a row's finding, in the page's order."""
@@ -79,7 +84,8 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "ego": found.ego,
         "baseline": found.baseline,
         "modes": [
-            _mode(mode, found.neighbourhood(mode.shown)) | {"step": step_in_words(mode, found)}
+            _mode(mode, found.neighbourhood(mode.shown))
+            | {"step": step_in_words(mode, found) or repeats_in_words(mode, found)}
             for mode in found.modes[:MOST_MODES]
         ],
         "more": max(0, len(found.modes) - MOST_MODES) + found.unrecorded_modes,
@@ -121,6 +127,9 @@ def _judged(found: Triage) -> dict[int, str]:
     for check in found.step_checks:
         if check.sentence:
             said.setdefault(check.evaluation, []).append(check.sentence)
+    for item in found.repeated:
+        played = "" if item.agrees else "; what is played is one more, which may not fail"
+        said.setdefault(item.evaluation, []).append(f"{item.sentence}{played}")
     return {evaluation: "; ".join(texts) for evaluation, texts in said.items()}
 
 

@@ -79,7 +79,7 @@ def _not_exported(data: ReportData) -> list[str]:
     """Return that nothing is exported and why, where no failure was found."""
     if not data.summary.finished or data.kept or data.triage is None or data.triage.modes:
         return []
-    if data.triage.bound.failures:
+    if data.triage.bound.space.harmful:
         return [*_bound(data), "These draws are exported: critical/fresh-01.xosc and so on."]
     return [*_bound(data), "No scenario is exported: only failures are."]
 

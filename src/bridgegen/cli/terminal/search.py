@@ -210,6 +210,8 @@ def conclusion(run: "Run") -> str:
         return f"{word}  {name}: violates {', '.join(violated)}"
     if run.verdict == "fails":
         drawn = f"{bound.space.harmful} of {bound.space.rows} fresh random draws"
+        if not bound.space.harmful:
+            drawn = f"repeats of {bound.in_repeats} evaluations that passed at first"
         none = f"in none of {bound.evaluations:,} evaluations"
         return f"{word}  {name}: in {drawn}, though {none}"
     _, _, why = bound.sentence.rstrip(".").partition(": ")
@@ -233,8 +235,10 @@ def _mode_lines(found: "Triage") -> list[str]:
         what, _, _ = mode.title.partition(" (")
         worst = percent(mode.severity) if mode.conflict == "contact" else mode.conflict
         hangs = "step-dependent" if step_in_words(mode, found) else ""
+        chance = found.chance(mode)
+        repeats = "" if chance is None else f"fails in {percent(chance[0])} of repeats"
         likely = f"P {mode.probability.sentence}" if mode.probability else ""
-        about = " · ".join(filter(None, [likely, mode.rule, worst, mode.cause, hangs]))
+        about = " · ".join(filter(None, [likely, mode.rule, worst, mode.cause, hangs, repeats]))
         head = f"{mode.number:>2} {bar:<{BAR}} {mode.count:>5,}  "
         width = WIDTH + len(likely)
         room = max(width - len(head) - len(about) - 3, 12)
@@ -247,6 +251,7 @@ def _mode_lines(found: "Triage") -> list[str]:
 def _found_lines(found: "Triage") -> list[str]:
     """Return how common failures are, the simplest one, what matters, and what does not count."""
     from bridgegen.search.triage.words import (
+        all_repeats_in_words,
         covered_in_words,
         parameters_in_words,
         steps_in_words,
@@ -272,6 +277,8 @@ def _found_lines(found: "Triage") -> list[str]:
         lines.append(f"What matters most: {text}")
     if found.bound.not_counted:
         lines.append(f"N{found.bound.not_counted[1:]}")
+    if again := all_repeats_in_words(found):
+        lines.append(f"Repeats: {again}")
     if found.missed:
         lines.append(f"Time step: {steps_in_words(found)}")
     if found.extrapolated:

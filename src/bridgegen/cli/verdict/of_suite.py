@@ -41,6 +41,8 @@ class SuiteCriteria(Conditions):
             f for outcome in outcomes for f in outcome.figures
         }:
             outcomes = unless_judged(outcomes, unjudged_entries(suite.results))
+        if "flaky" not in {f for outcome in outcomes for f in outcome.figures}:
+            outcomes = unless_judged(outcomes, flaky_entries(suite, suite.results))
         if not outcomes:
             outcomes = tuple(_all_pass(suite, ego) for ego in suite.egos)
         if self.junit is not None:
@@ -65,6 +67,7 @@ def figures_of(suite: SuiteRun) -> dict[str, float]:
         "not_judged": number["not judged"],
         "not_judged_entries": sum(result.verdict == "not judged" for result in results),
         "not_run": number["not run"],
+        "flaky": number["flaky"],
         "failed_entries": sum(result.verdict == "failed" for result in results),
         "failed_clauses": sum(
             result.verdict == "failed"
@@ -91,6 +94,18 @@ def unjudged_entries(results: Sequence[EntryResult]) -> str:
     return named([f"{o.entry}: {o.unjudged}" for o in results if o.verdict == "not judged"])
 
 
+def flaky_entries(suite: SuiteRun, results: Sequence[EntryResult]) -> str:
+    """Return which entries have flaky variations, in words; "" without any that is not known."""
+    by_entry = [(o, _flaky(suite, o)) for o in results]
+    return named([f"{o.entry}: {len(at)} {o.rows[at[0]].flaky}" for o, at in by_entry if at])
+
+
+def _flaky(suite: SuiteRun, of: EntryResult) -> list[int]:
+    """Return the numbers of the variations whose repeats disagree, but for known failures."""
+    rows = ((i, row) for i, row in enumerate(of.rows) if row.flaky)
+    return [i for i, row in rows if suite.known_failures.standing(of, row) not in EXCUSED]
+
+
 def named(entries: Sequence[str]) -> str:
     """Return texts on entries as one, of at most `MOST_ENTRIES` of them."""
     more = len(entries) - MOST_ENTRIES
@@ -105,6 +120,7 @@ def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
     details = f"{number['failed']} of {total} fail, {number['passed']} pass"
     details += f", {number['not judged']} not judged" if number["not judged"] else ""
     details += f", {number['not run']} not run" if number["not run"] else ""
+    details += f", {number['flaky']} flaky" if number["flaky"] else ""
     standing = suite.known_failures.counts(results)
     known = sum(standing[name] for name in EXCUSED)
     if known:
@@ -114,9 +130,10 @@ def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
         details += f", and {'fails' if len(again) == 1 else 'fail'} again"
     verdict: Verdict = "passed"
     # A failure comes before what could not be judged: it stays one, however much else is missing.
-    if number["failed"] > known:
+    why = "; ".join(filter(None, (unjudged_entries(results), flaky_entries(suite, results))))
+    if standing["new"] + standing["regression"]:
         verdict = "failed"
-    elif (why := unjudged_entries(results)) or number["not run"] or not number["passed"] + known:
+    elif why or number["not run"] or not number["passed"] + known:
         verdict = "unknown"
         details += f"; {why}" if why else ""
     test = "variations" + (" but known failures" if suite.known_failures.failures else "")
@@ -180,11 +197,15 @@ def _cases(suite: SuiteRun, entry_result: EntryResult, group: str) -> list[Case]
     lost = [i for i, row in enumerate(entry_result.rows) if row.problem]
     cases = [case_of_rows(group, "runs", entry_result, lost, "did not run", "error")]
     odd = [i for i, verdict in enumerate(entry_result.verdicts) if verdict == "not judged"]
-    critical = [i for i, row in enumerate(entry_result.rows) if row.critical]
+    flaky, agree = _flaky(suite, entry_result), "repeats agree"
+    if any(row.repeats > 1 for row in entry_result.rows):
+        cases.append(case_of_rows(group, agree, entry_result, flaky, "are flaky", "error", suite))
+    sure = [(i, row) for i, row in enumerate(entry_result.rows) if not row.flaky]
+    critical = [i for i, row in sure if row.critical]
     excused = all(stated.is_excused(entry_result, entry_result.rows[i]) for i in critical)
     cases.append(case("no critical scenario", critical, "critical", excused))
     for number, given in enumerate(entry_result.criteria):
-        violating = [i for i, row in enumerate(entry_result.rows) if number in row.violated]
+        violating = [i for i, row in sure if number in row.violated]
         words = words_of(read_criterion(given))
         cases.append(
             case(words, violating, "violate it", stated.is_criterion_excused(entry_result, number))
@@ -194,16 +215,17 @@ def _cases(suite: SuiteRun, entry_result: EntryResult, group: str) -> list[Case]
         failing = [i for i, letter in enumerate(entry_result.letters(number)) if letter == FAILED]
         name = f"clause {clause.id}: {clause.text}"
         cases.append(case(name, failing, "fail it", known=False))
-    if entry_result.verdict != "not judged":
+    what = f"not judged: {entry_result.unjudged}"
+    if flaky:
+        odd, what = flaky, f"not judged: {entry_result.rows[flaky[0]].flaky}"
+    elif entry_result.verdict != "not judged":
         return cases
-    why = case_of_rows(
-        group, "", entry_result, odd, f"not judged: {entry_result.unjudged}", "error"
-    )
+    why = case_of_rows(group, "", entry_result, odd, what, "error")
     return [
         each
         # What failed stays failed, and that it ran is known; only passes are taken back.
         if each.problem or each.name == "runs"
-        else replace(why, name=each.name, message=f"not judged: {entry_result.unjudged}")
+        else replace(why, name=each.name, message=what)
         for each in cases
     ]
 
@@ -250,6 +272,7 @@ def row_in_words(entry_result: EntryResult, i: int, row: RowResult) -> str:
         if row.conflict
         else "no conflict"
     )
+    happened += f"; {row.flaky}" if row.flaky else ""
     if row.outcome not in (None, "avoided"):
         happened += f"; {row.outcome}, impact at {row.impact_speed:.3g} m/s"
     return f"variation {i + 1}{f' ({named})' if named else ''}: {happened}"

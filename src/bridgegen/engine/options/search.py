@@ -33,6 +33,7 @@ MAX_BUDGET = 10**7
 MAX_SEED = 2**32 - 1
 MAX_KEEP = 1000
 MAX_AHEAD = 10_000
+MAX_REPEATS = 1000
 
 OF_ODD = option(
     ODD,
@@ -429,6 +430,18 @@ class SearchOptions(CommonOptions):
             before="full",
             group=OUTPUT,
             names="triage",
+        ),
+    )
+    repeats: int | None = field(
+        default=None,
+        metadata=option(
+            WHOLE,
+            "How often findings of a search are evaluated again, at most, or each variation of a "
+            "suite is run, if driver or simulator may not repeat: how likely each fails.",
+            shown="1",
+            limits=(1, MAX_REPEATS),
+            before=None,
+            group=OF_DRIVER,
         ),
     )
     simulator: SimulatorChoice = field(

@@ -306,7 +306,7 @@ def _result(
             *violations(judged, scenario, driver.name),
         ),
         judged=judged,
-        unjudged=entry_result.verdict == "not judged",
+        unjudged=entry_result.verdict in ("not judged", "flaky"),
         seen=_seen_in_entry(entry_result, _scenery(project, entry_result, sceneries)),
         entry=entry_result.entry,
         ego=entry_result.ego or entry_result.driver,
@@ -319,7 +319,7 @@ def _judged_entry(entry_result: EntryResult) -> Iterator[Judged]:
         margins = [
             row.margins[i]
             for row, verdict in zip(entry_result.rows, entry_result.verdicts, strict=True)
-            if i < len(row.margins) and verdict != "not judged"
+            if i < len(row.margins) and verdict not in ("not judged", "flaky")
         ]
         violated = sum(margin < 0.0 for margin in margins)
         yield Judged(

@@ -65,7 +65,7 @@ from bridgegen.search.algorithms.algorithm import Problem, resolve
 from bridgegen.search.algorithms.automatic import AUTO, RATE, automatic
 from bridgegen.search.triage.effort import effort
 from bridgegen.search.triage.fresh import failing_draws
-from bridgegen.search.triage.record import write_record
+from bridgegen.search.triage.record import JSON_FILE, Repeated, read_record, write_record
 from bridgegen.search.triage.triage import triage
 from bridgegen.simulation.choice import SimulatorChoice
 
@@ -386,6 +386,10 @@ def _finish(
     records_harm = pipeline.objective.harm in pipeline.metrics  # not in runs of earlier versions
     if rule == "criteria" or not records_harm:
         best = _critical_by_objective(rows, settings.keep)
+    repeats = settings.repeats or 1
+    if repeats > 1 and pipeline.repeats:
+        name, repeats = pipeline.driver.label, 1
+        callbacks.warning(f"--repeats: {name} always repeats here, so nothing is evaluated again")
     if records_harm:
         triaged = triage(
             pipeline,
@@ -397,6 +401,8 @@ def _finish(
             effort=effort(settings.triage),
             domain=store.domain,
             drawn=drawn_of(algorithm, pipeline, settings, store) if settings.rate else None,
+            repeats=repeats,
+            known=_known_repeats(store, rows) if repeats > 1 else (),
         )
         if rule != "criteria":
             best = np.array(triaged.exports, dtype=np.int64)
@@ -418,6 +424,15 @@ def _finish(
     there = np.flatnonzero(np.isin(best, [item.evaluation for item in exported]))
     write_run_report(pipeline, run, rows, exported, replays.take(there) if replays else None)
     return run
+
+
+def _known_repeats(store: Store, rows: Recorded) -> tuple[Repeated, ...]:
+    """Return the repeats that an earlier triage of these rows has recorded."""
+    try:
+        record = read_record(store.folder / JSON_FILE, rows.digest())
+    except BridgeGenError:  # damaged, or of fewer rows: it is written anew
+        record = None
+    return record.repeated if record else ()
 
 
 def _extrapolated(

@@ -15,6 +15,7 @@ from bridgegen.assess.conflict.harm import NEAR_MISS, Count
 from bridgegen.assess.conflict.summary import ConflictSummary, summarise
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import OntologyError, StorageError
+from bridgegen.base.statistics import confidence_sequence
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.replays import Replays
 from bridgegen.jobs.search.exported import FOLDER, NOT_EXPORTED, Exported, Refused
@@ -23,7 +24,7 @@ from bridgegen.results.store import Rows
 from bridgegen.scenario.language.prior import rarities
 from bridgegen.search.algorithms.dominance import by_merit
 from bridgegen.search.triage.judgement import judgement
-from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Triage
+from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Repeated, Triage
 from bridgegen.search.triage.what_happened import distinct
 from bridgegen.simulation.rollout import Rollout
 
@@ -111,7 +112,7 @@ def export_critical(
             files.append(fresh / f"{name}.json")
             facts = (
                 _facts(pipeline, rows, i, name)
-                | _triaged(name, quick, tested, triage)
+                | _triaged(name, int(rows.id[i]), quick, tested, triage)
                 | {"judgement": judged or None}
                 | {"conflict": None if conflict is None else conflict.to_dict()}
             )
@@ -172,17 +173,25 @@ def _cause(quick: Cause, tested: Neighbourhood | None) -> Cause:
 
 
 def _triaged(
-    name: str, quick: Cause, tested: Neighbourhood | None, triage: Triage | None
+    name: str, row: int, quick: Cause, tested: Neighbourhood | None, triage: Triage | None
 ) -> dict[str, object]:
     """Return the triage's findings on an exported scenario, as JSON's types."""
     modes = [mode.number for mode in (triage.modes if triage else ()) if name in mode.exports]
     cause = tested.cause if tested is not None and tested.cause else quick.label
+    again = triage.of_repeats(row) if triage else None
     return {
         "cause": cause or None,
         "quick_cause": quick.label or None,
         "mode": modes[0] if modes else None,
         "robustness": tested.robustness if tested is not None else None,
+        **({} if again is None else {"repeats": _repeats_of(again)}),
     }
+
+
+def _repeats_of(again: Repeated) -> dict[str, object]:
+    low, high = confidence_sequence(again.fails, again.repeats)
+    found = again.model_dump(include={"fails", "repeats", "lost"})
+    return found | {"p_fail": again.probability, "interval": [low, high]}
 
 
 def _write_minimal(

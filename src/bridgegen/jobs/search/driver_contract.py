@@ -26,6 +26,9 @@ parked cars."""
 ROWS = 16
 """Number of rows per scenario: few, since each is driven several times."""
 
+JUDGED = 25
+"""Number of rows per scenario whose verdict is compared, if the driver does not repeat."""
+
 MANY, SECONDS = 512, 1.0
 """Largest number of rows in the batch that measures the driver's speed, and its longest duration
 [s], for which it has fewer."""
@@ -97,6 +100,7 @@ def check_driver(
         InputError: the driver cannot be created, or no such scenario.
     """
     done: list[Check] = []
+    counts = np.zeros(2, dtype=np.int64)
     for name in scenarios:
         logical = load(name)
         pipeline = Pipeline(
@@ -110,7 +114,16 @@ def check_driver(
                 yield Check(spec, "it is", figure=described(spec, pipeline))
             done.append(check)
             yield check
+        broken = {check.rule for check in done if check.problem and check.scenario == name}
+        seeded = "seed" in pipeline.runner.embedded.own_driver.traits.wants
+        if seeded or broken & {AGAIN, ANEW}:
+            counts += _verdicts(pipeline, rng)
     yield from _in_short(done)
+    if counts.any():
+        changed, of = counts.tolist()
+        told = f"{changed} of {of} scenarios change their verdict; use --repeats 10"
+        why = "by its seed" if seeded else "does not repeat"
+        yield Check("in short", "verdicts", figure=f"{why}: {told}")
 
 
 def described(spec: str, pipeline: Pipeline) -> str:
@@ -144,6 +157,15 @@ def described(spec: str, pipeline: Pipeline) -> str:
         or "nothing valid"
     )
     return f"{kind}; {asked}; {wants}; answers {answers}"
+
+
+def _verdicts(pipeline: Pipeline, rng: np.random.Generator) -> tuple[int, int]:
+    """Return how many scenarios change their verdict when driven again, and how many have two."""
+    pipeline.choose_objective()
+    X = pipeline.space.decode(rng.random((JUDGED, pipeline.space.n_var)))
+    first, second = (pipeline.evaluate(X, number) for number in (1, 2))
+    known = (first.status == 0) & (second.status == 0)
+    return int((first.critical != second.critical)[known].sum()), int(known.sum())
 
 
 def _in_short(done: Sequence[Check]) -> Iterator[Check]:

@@ -84,8 +84,9 @@ class Settings(SearchOptions):
         plain = {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
         if not self.own_metrics:
             del plain["own_metrics"]  # as in runs of earlier versions
-        if self.odd is None:
-            del plain["odd"]
+        for name in ("odd", "repeats"):
+            if plain[name] is None:
+                del plain[name]
         if not self.rate:
             del plain["rate"], plain["exposure"]
         chosen = {name: plain.pop(name) for name in CHOSEN}

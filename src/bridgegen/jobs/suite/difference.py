@@ -50,6 +50,7 @@ class RowChange:
         severity: second less first, of the probability of MAIS3+.
         harm: second less first.
         run: whether both have a result.
+        flaky: whether repeats with one of them disagree.
     """
 
     entry: str
@@ -58,6 +59,7 @@ class RowChange:
     severity: float
     harm: float
     run: bool = True
+    flaky: bool = False
 
     @property
     def kind(self) -> Kind:
@@ -103,6 +105,8 @@ class Difference:
         kinds = self.kinds
         n = len(self.rows) - kinds["not comparable"]
         lost = f"; {kinds['not comparable']:,} not comparable" if kinds["not comparable"] else ""
+        if flaky := sum(row.flaky for row in self.rows):
+            lost += f" ({flaky:,} flaky)"
         return (
             f"{self.second} against {self.first}: fixes {kinds['fixed']:,}, breaks "
             f"{kinds['broken']:,}, {kinds['worse']:,} worse, {kinds['milder']:,} milder of {n:,} "
@@ -189,7 +193,7 @@ def _change(
     entry: str, row: int, a: RowResult, b: RowResult, verdicts: tuple[Verdict, Verdict]
 ) -> RowChange:
     change: Change = "not comparable"
-    if not {"not run", "not judged"} & {*verdicts}:
+    if not {"not run", "not judged", "flaky"} & {*verdicts}:
         named: dict[tuple[bool, bool], Change] = {
             (True, True): "both fail",
             (True, False): "fixed",
@@ -198,7 +202,8 @@ def _change(
         }
         change = named[verdicts[0] == "failed", verdicts[1] == "failed"]
     run = "not run" not in verdicts
-    return RowChange(entry, row, change, b.severity - a.severity, b.harm - a.harm, run)
+    flaky = "flaky" in verdicts
+    return RowChange(entry, row, change, b.severity - a.severity, b.harm - a.harm, run, flaky)
 
 
 # --- Searches of a suite's scenarios for where one ego is worse than another ---

@@ -54,6 +54,7 @@ class Job:
         edition: of a logical scenario's matrix; None: all, "none": samples instead.
         only: the number of the one row that is run, from 0 on; None: all.
         draw: what an assessor's key draws in place of these rows.
+        repeats: how often each row is evaluated, unless it is known to repeat.
     """
 
     entry: Entry
@@ -65,6 +66,7 @@ class Job:
     edition: str | None = None
     only: int | None = None
     draw: Draw | None = None
+    repeats: int = 1
 
     @property
     def driver_digest(self) -> str:
@@ -190,10 +192,13 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     rows, texts = list[RowResult](), list[str]()
     for start in range(0, len(X), AT_ONCE):
         some = X[start : start + AT_ONCE]
-        evaluation = pipeline.evaluate(some)
-        texts += evaluation.findings.happened.tolist()
-        found_here = _rows(pipeline, some, evaluation, names)
-        rows += judged(pipeline, job.simulator, some, found_here)
+        tries = []
+        for number in range(1 if pipeline.repeats else job.repeats):
+            evaluation = pipeline.evaluate(some, number)
+            texts += evaluation.findings.happened.tolist()
+            found_here = _rows(pipeline, some, evaluation, names)
+            tries.append(judged(pipeline, job.simulator, some, found_here))
+        rows += [RowResult.of_repeats(each) for each in zip(*tries, strict=True)]
     happening = Happening.of(texts)
     beyond = "" if job.entry.is_failure else outside(pipeline.runner)
     if job.entry.is_failure:  # it is about that conflict: one that stops for it has met it

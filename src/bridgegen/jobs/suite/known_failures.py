@@ -9,7 +9,9 @@ from typing import Literal, Self
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.results.failures import Failure, FailureFile, Status, failure_of
 
-Standing = Literal["passed", "not run", "not judged", "new", "known", "accepted", "regression"]
+Standing = Literal[
+    "passed", "not run", "not judged", "flaky", "new", "known", "accepted", "regression"
+]
 """Status of a variation: known and accepted failures do not fail a suite; new ones do, and
 regressions: failures that were fixed and are there again."""
 
@@ -66,17 +68,17 @@ class KnownFailures:
     def standing(self, entry_result: EntryResult, row: RowResult) -> Standing:
         """Return how a variation of an entry stands."""
         verdict = row.verdict
-        if verdict != "failed":
+        if verdict != "failed" and verdict != "flaky":
             return verdict
         found = self.failures.get(entry_result.entry)
         if found is None:
-            return "new"
+            return "new" if verdict == "failed" else "flaky"
         status = found[1].status
         if status == "fixed":
             return "regression"
         known = not row.critical or self.is_excused(entry_result, row)
         known &= all(self.is_criterion_excused(entry_result, i) for i in row.violated)
-        return status if known else "new"
+        return status if known and status != "new" else "new" if verdict == "failed" else "flaky"
 
     def worst(self, entry_result: EntryResult) -> Standing:
         """Return how an entry stands: as its worst variation does."""
@@ -84,6 +86,7 @@ class KnownFailures:
         order: tuple[Standing, ...] = (
             "regression",
             "new",
+            "flaky",
             "not run",
             "known",
             "accepted",
@@ -143,7 +146,7 @@ class KnownFailures:
 
 def words(standing: Standing, failure: tuple[str, Failure] | None) -> str:
     """Return how a failing entry stands, where an index names it."""
-    if failure is None or standing in ("passed", "not run", "not judged"):
+    if failure is None or standing in ("passed", "not run", "not judged", "flaky"):
         return ""
     note = f", {failure[1].note}" if failure[1].note else ""
     if standing == "regression":

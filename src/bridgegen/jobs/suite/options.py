@@ -9,7 +9,7 @@ from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.forms import FLAG, PATH, TEXT, WHOLE
 from bridgegen.engine.options.forms import SIMULATOR as CHOICE
 from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, SIMULATOR, WHAT, option
-from bridgegen.engine.options.search import MAX_BUDGET, OF_ODD
+from bridgegen.engine.options.search import MAX_BUDGET, OF_ODD, SearchOptions
 from bridgegen.jobs.frame import DRIVERS, SCENARIOS, Job, SimulatingOptions
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 
@@ -21,7 +21,7 @@ SAMPLES, MAX_SAMPLES = 100, 10**7
 
 def _of_search(name: str) -> Mapping[str, Any]:
     """Return the declaration of an option that searches have, too."""
-    (declared,) = (item.metadata for item in fields(CommonOptions) if item.name == name)
+    (declared,) = (item.metadata for item in fields(SearchOptions) if item.name == name)
     return declared
 
 
@@ -55,6 +55,7 @@ class ScenariosOptions(SimulatingOptions):
     vehicle: str | None = field(default=None, metadata=_of_search("vehicle"))
     others: str | None = field(default=None, metadata=_of_search("others"))
     time_limit: float | None = field(default=None, metadata=_of_search("time_limit"))
+    repeats: int | None = field(default=None, metadata=_of_search("repeats"))
     criteria: Sequence[Mapping[str, str | Sequence[str]]] = field(
         default=(), metadata=_of_search("criteria")
     )
@@ -204,6 +205,7 @@ SUITE = Job(
         "new_failures": "the other failed ones",
         "not_judged": "variations that could not be judged: they say nothing of the ego",
         "not_judged_entries": "entries that could not be judged",
+        "flaky": "variations whose repeats disagree: they neither pass nor fail",
         "not_run": "variations that did not run; an entry that cannot run is one",
         "failed_entries": "entries in which a variation fails",
         "failed_clauses": "clauses of a regulation that an ego fails",

@@ -79,6 +79,7 @@ class Motion:
 
 
 _LETTER: dict[Verdict, str] = {"passed": "p", "failed": "f", "not run": "n", "not judged": "u"}
+_LETTER["flaky"] = "y"
 _OUTCOME: dict[Outcome | None, str] = {
     "avoided": "a",
     "mitigated": "m",
@@ -248,7 +249,7 @@ def _result(
     """Return a cell of the table; what is absent is not said."""
     found: dict[str, Any] = {
         "v": _LETTER[entry_result.verdict],
-        "n": [entry_result.count(verdict) for verdict in _LETTER],
+        "n": [n for v in _LETTER if (n := entry_result.count(v)) or v != "flaky"],
     }
     lost = entry_result.problem or next(
         (row.problem for row in entry_result.rows if row.problem), ""
@@ -334,7 +335,7 @@ def _matrix(suite: SuiteRun, criteria: Mapping[str, int]) -> list[dict[str, Any]
                 known = [
                     row.margins[i]
                     for row, verdict in zip(result.rows, result.verdicts, strict=True)
-                    if i < len(row.margins) and verdict != "not judged"
+                    if i < len(row.margins) and verdict not in ("not judged", "flaky")
                 ]
                 violated = sum(margin < 0.0 for margin in known)
                 table = of[criteria[_text(criterion)]]
@@ -437,7 +438,7 @@ def _of_entry(
             continue
         verdicts = [_LETTER[verdict] for verdict in result.verdicts]
         ranks = [
-            ("fnup".index(v), *rank(row)) for v, row in zip(verdicts, result.rows, strict=True)
+            ("fynup".index(v), *rank(row)) for v, row in zip(verdicts, result.rows, strict=True)
         ]
         kept = sorted(range(len(result.rows)), key=lambda i: (*ranks[i], i))[:most]
         rows = [result.rows[i] for i in kept]
@@ -467,7 +468,9 @@ def _of_entry(
                 "type": words.at(row.conflict_type for row in rows),
                 "partner": words.at(row.partner for row in rows),
                 "responsible": words.at(row.responsible for row in rows),
-                "note": words.at(row.problem or row.implausible or row.unjudged for row in rows),
+                "note": words.at(
+                    row.problem or row.flaky or row.implausible or row.unjudged for row in rows
+                ),
                 "beside": _beside(results, result, kept) if same else [],
             }
         )

@@ -43,6 +43,7 @@ class _Settings(Strict):
     secret: str | None = None
     drawn: int = 0
     odd: dict[str, Any] | None = None
+    repeats: int | None = None
     version: str
 
 
@@ -154,7 +155,12 @@ def _of_file(job: Job, pipeline: Pipeline, file: Path) -> EntryResult:
 
 def _moves_alike(row: RowResult, exported: EntryResult) -> bool:
     """Return whether results are equal but for values, clauses and the rule of what is critical."""
-    bare = {"x": [], "critical": False, "clauses": ""}  # a file states neither rule nor clauses
+    bare = {
+        "x": [],
+        "critical": False,
+        "clauses": "",
+        "fails": 0,
+    }  # a file states neither rule nor clauses
     rows = exported.rows
     return len(rows) == 1 and rows[0].model_copy(update=bare) == row.model_copy(update=bare)
 
@@ -211,6 +217,7 @@ def job_of(suite: SuiteRun, result: EntryResult, simulator: SimulatorChoice | No
         settings.seed,
         settings.matrix,
         draw=Draw(settings.secret, settings.drawn) if settings.secret else None,
+        repeats=settings.repeats or 1,
     )
 
 

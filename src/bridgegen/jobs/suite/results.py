@@ -9,9 +9,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from bridgegen.assess.conflict.findings import why_unjudged
 from bridgegen.search.triage.bound import too_few
+from bridgegen.search.triage.record import repeats_needed, repeats_sentence
 
-Verdict = Literal["passed", "failed", "not judged", "not run"]
-VERDICTS: tuple[Verdict, ...] = ("passed", "failed", "not judged", "not run")
+Verdict = Literal["passed", "failed", "not judged", "not run", "flaky"]
+VERDICTS: tuple[Verdict, ...] = ("passed", "failed", "not judged", "not run", "flaky")
 
 Outcome = Literal["avoided", "mitigated", "not avoided"]
 OUTCOMES: tuple[Outcome, ...] = ("avoided", "mitigated", "not avoided")
@@ -36,7 +37,7 @@ class Strict(BaseModel):
 
 
 class RowResult(Strict):
-    """The result of one variation.
+    """The result of one variation; of several evaluations of it, the first of the worst.
 
     Attributes:
         x: values of the entry's ``parameters``; texts by themselves.
@@ -60,6 +61,8 @@ class RowResult(Strict):
         margins: of the entry's criteria; None: without a result.
         clauses: what it means for each of the entry's clauses, a letter each; empty without a
             result.
+        repeats: how many evaluations of it pass or fail; 1 where it was evaluated once.
+        fails: of them, where there are several.
     """
 
     x: list[float | str] = []
@@ -80,12 +83,39 @@ class RowResult(Strict):
     unsafe_start: bool = False
     margins: list[float] = []
     clauses: str = Field(default="", pattern="^[pfunx]{0,1000}$")
+    repeats: int = 1
+    fails: int = 0
+
+    @classmethod
+    def of_repeats(cls, tries: "Sequence[RowResult]") -> "RowResult":
+        """Return the result of evaluations of one variation, in their order."""
+        if len(tries) == 1:
+            return tries[0]
+        verdicts = [row.verdict for row in tries]
+        worst = next(name for name in (*WORST, "passed") if name in verdicts)
+        row, fails = tries[verdicts.index(worst)], verdicts.count("failed")
+        counts: dict[str, Any] = {"repeats": fails + verdicts.count("passed"), "fails": fails}
+        if row.problem:
+            counts["problem"] = f"{verdicts.count(worst)} of {len(tries)} repeats: {row.problem}"
+        return row.model_copy(update=counts)
+
+    @property
+    def flaky(self) -> str:
+        """That its evaluations disagree, in words, and how many tell more; "" if they agree."""
+        if not 0 < self.fails < self.repeats:
+            return ""
+        needed = repeats_needed(self.fails, self.repeats)
+        number = "more than 1000" if needed is None else needed
+        sentence = repeats_sentence(self.fails, self.repeats)
+        return f"flaky: {sentence}; needs {number} repeats for a verdict at 95 %"
 
     @property
     def verdict(self) -> Verdict:
         """Whether the ego passes: it neither is critical nor violates a criterion or a clause."""
         if self.problem:
             return "not run"
+        if 0 < self.fails < self.repeats:
+            return "flaky"
         if self.critical or self.violated or FAILED in self.clauses:
             return "failed"
         return "not judged" if self.unjudged else "passed"
@@ -115,6 +145,10 @@ class RowResult(Strict):
     def violated(self) -> list[int]:
         """The numbers of the criteria that it violates."""
         return [i for i, margin in enumerate(self.margins) if margin < 0.0]
+
+
+WORST: tuple[Verdict, ...] = ("failed", "flaky", "not run", "not judged")
+"""Verdicts that are no pass, the worst first: a failure is one whatever else did not run."""
 
 
 class GridResult(Strict):
@@ -184,11 +218,12 @@ class EntryResult(Strict):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of its rows: failed, else not run; else whether it is judged."""
+        """The worst of its rows: failed, else flaky or not run; else whether it is judged."""
         verdicts = {row.verdict for row in self.rows}
         # A failure is one whatever else did not run: it is never hidden by a missing result.
-        if "failed" in verdicts:
-            return "failed"
+        for name in WORST[:2]:
+            if name in verdicts:
+                return name
         if self.problem or not self.rows or "not run" in verdicts:
             return "not run"
         return "not judged" if self.unjudged else "passed"
@@ -241,8 +276,12 @@ class EntryResult(Strict):
         """
         if not self.rows:
             return NOT_RUN
-        # A row without a result has no letters.
-        found = "".join(row.clauses[clause : clause + 1] or NOT_RUN for row in self.rows)
+        # A row without a result has no letters; a flaky one passes nothing.
+        found = "".join(
+            NOT_RUN if row.flaky and letter != FAILED else letter
+            for row in self.rows
+            for letter in (row.clauses[clause : clause + 1] or NOT_RUN,)
+        )
         if not self._says_nothing:
             return found
         # Failures stay: only what would pass says nothing.

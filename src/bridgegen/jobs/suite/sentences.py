@@ -141,6 +141,7 @@ _WORD: dict[Verdict, str] = {
     "passed": "passes",
     "not judged": "is not judged",
     "not run": "did not run",
+    "flaky": "is flaky",
 }
 
 
@@ -167,6 +168,7 @@ def headline(results: Sequence[EntryResult], label: str) -> str:
     partly = sum(result.verdict == "not run" and result.count("passed") > 0 for result in results)
     unjudged = number["not judged"]
     said = [f"{unjudged:,} {'is' if unjudged == 1 else 'are'} not judged"] if unjudged else []
+    said += [f"{number['flaky']:,} flaky"] if number["flaky"] else []
     lost = [f"{number['not run'] - partly:,} did not run"] if number["not run"] > partly else []
     lost += [f"{partly:,} ran only in part"] if partly else []
     return "; ".join([words, *said, *lost])
@@ -230,7 +232,7 @@ def difference(verdicts: Sequence[Verdict], labels: Sequence[str]) -> str:
             return f"only {alone[0]} {_WORD[verdict]}"
     parts = [
         f"{', '.join(who[verdict])} {_of_many(_WORD[verdict], len(who[verdict]))}"
-        for verdict in ("failed", "passed", "not judged", "not run")
+        for verdict in ("failed", "flaky", "passed", "not judged", "not run")
         if verdict in who
     ]
     return "; ".join(parts)
@@ -260,7 +262,12 @@ def differences(of_entries: Sequence[Sequence[Verdict]], labels: Sequence[str]) 
 
 
 def _of_many(word: str, number: int) -> str:
-    many = {"fails": "fail", "passes": "pass", "is not judged": "are not judged"}
+    many = {
+        "fails": "fail",
+        "passes": "pass",
+        "is not judged": "are not judged",
+        "is flaky": "are flaky",
+    }
     return many.get(word, word) if number > 1 else word
 
 

@@ -50,6 +50,7 @@ def json_of_suite(suite: SuiteRun) -> dict[str, Any]:
                 "failed": result.count("failed"),
                 "not_judged": result.count("not judged"),
                 "not_run": result.count("not run"),
+                "flaky": [text for row in result.rows if (text := row.flaky)],
                 "unjudged": result.unjudged if result.verdict == "not judged" else None,
                 "outcomes": result.outcomes(),
                 "problem": result.problem or None,
@@ -116,6 +117,7 @@ def _totals(suite: SuiteRun, ego: str, label: str) -> Iterator[str]:
         f"{label}: {entries} of {len(results)} scenarios pass"
         + (f", {unjudged} {'is' if unjudged == 1 else 'are'} not judged" if unjudged else "")
         + f"; of their variations {number['passed']} pass, {number['failed']} fail, "
+        + (f"{number['flaky']} are flaky, " if number["flaky"] else "")
         + (f"{number['not judged']} not judged, " if number["not judged"] else "")
         + f"{number['not run']} did not run"
     )
@@ -140,9 +142,11 @@ def _counted(entry_result: EntryResult) -> str:
         return "not run"
     n = len(entry_result.rows)
     failed, unjudged, lost = (entry_result.count(v) for v in ("failed", "not judged", "not run"))
-    if not failed and not unjudged and not lost:
+    flaky = entry_result.count("flaky")
+    if not failed and not unjudged and not lost and not flaky:
         return "pass" if n == 1 else f"pass ({n})"
     parts = [f"{failed} of {n} fail"] if failed else []
+    parts += [f"{flaky} of {n} flaky"] if flaky else []
     if entry_result.verdict == "not judged":
         parts.append("NOT JUDGED")
     elif unjudged:
@@ -167,7 +171,7 @@ def _worst(some: Sequence[EntryResult]) -> str:
             texts += [f"MAIS3+ {percent(row.severity)}"] if row.severity else []
             texts += [f"violates {violated}"] if violated else []
             return "; ".join(texts)
-    lost = [
+    lost = [text for result in some for row in result.rows if (text := row.flaky)][:1] + [
         result.problem or next((r.problem for r in result.rows if r.problem), "") for result in some
     ]
     return next(filter(None, [*lost, *(o.unjudged for o in some if o.verdict == "not judged")]), "")

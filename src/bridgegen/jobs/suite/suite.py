@@ -205,6 +205,7 @@ def run_entries(
             given.seed,
             given.matrix,
             draw=draw,
+            repeats=given.repeats or 1,
         )
         for entry in entries
         for ego in drivers
@@ -299,6 +300,7 @@ def settings_of(options: ScenariosOptions, simulator: SimulatorChoice) -> dict[s
         "time_limit": options.time_limit,
         "version": version("bridgegen"),
         **({} if options.odd is None else {"odd": options.odd}),
+        **({} if options.repeats is None else {"repeats": options.repeats}),
     }
 
 
@@ -314,7 +316,9 @@ def _run(
     number: Counter[str] = Counter()
 
     def show() -> None:
-        facts = [f"{number[name]} {name}" for name in ("not judged", "not run") if number[name]]
+        facts = [
+            f"{number[name]} {name}" for name in ("flaky", "not judged", "not run") if number[name]
+        ]
         facts = [f"{number['failed']} failed", *facts]
         given.callbacks.progress("scenarios", len(done), total, ", ".join(facts))
 

@@ -15,7 +15,7 @@ function showResult() {
   $("facts").append(...suite.facts.map((fact) => element("li", {}, fact)));
   suite.headlines.forEach((headline, e) => {
     const count = (v) => suite.entries.filter(({ results }) => results[e]?.v === v).length;
-    $("result").append(element("p", { class: "headline" }, `${headline}.`), bar(["p", "f", "n", "u"].map(count)), ...suite.outcomes[e].map((text) => element("p", { class: "outcome" }, `${text}.`)));
+    $("result").append(element("p", { class: "headline" }, `${headline}.`), bar(["p", "f", "n", "u", "y"].map(count)), ...suite.outcomes[e].map((text) => element("p", { class: "outcome" }, `${text}.`)));
   });
   for (const text of [suite.changes, suite.differences]) {
     if (text) $("result").append(element("p", { class: "differences" }, text));

@@ -49,7 +49,7 @@ function columnsOf(found, words, ego) {
     ["responsible", word("responsible"), (value) => value, "", ""],
   );
   const notes = word("note");
-  if (notes.some(Boolean)) columns.push(["note", notes, (value) => value, "words", "why it did not run, or is not judged"]);
+  if (notes.some(Boolean)) columns.push(["note", notes, (value) => value, "words", "why it did not run, is flaky or not judged"]);
   if (!few) columns.push(...parameters);
   return columns.filter(([title, values]) => !["conflict", "type", "partner", "responsible"].includes(title) || values.some(Boolean));
 }

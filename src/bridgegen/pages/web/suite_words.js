@@ -5,26 +5,26 @@ import { data } from "./data.js";
 import { conflictWord } from "./findings.js";
 
 export const suite = data.suite;
-export const WORSE = { f: 0, n: 1, u: 2, p: 3 };
-export const PASSES = { f: "fails", n: "did not run", u: "not judged", p: "passes" };
-export const MARKS = { f: "✗", n: "?", u: "○", p: "✓" };
-export const CLASSES = { f: "failed", n: "lost", u: "unjudged", p: "passed" };
+export const WORSE = { f: 0, y: 1, n: 2, u: 3, p: 4 };
+export const PASSES = { f: "fails", y: "is flaky", n: "did not run", u: "not judged", p: "passes" };
+export const MARKS = { f: "✗", y: "~", n: "?", u: "○", p: "✓" };
+export const CLASSES = { f: "failed", y: "unjudged", n: "lost", u: "unjudged", p: "passed" };
 export const counted = (n) => n.toLocaleString("en-GB");
 
 // The verdict of a scenario with an ego, in words.
-export function verdictWords({ v, n: [passed, failed, lost, unjudged] }) {
-  const n = passed + failed + lost + unjudged, some = (count, words) => (count ? `${counted(count)} of ${counted(n)} ${words}` : "");
+export function verdictWords({ v, n: [passed, failed, lost, unjudged, flaky = 0] }) {
+  const n = passed + failed + lost + unjudged + flaky, some = (count, words) => (count ? `${counted(count)} of ${counted(n)} ${words}` : "");
   if (n <= 1 || lost === n) return PASSES[v];
   if (passed === n || unjudged === n) return `${PASSES[v]} (${counted(n)})`;
-  return [v === "p" ? `passes ${counted(passed)}` : "", v === "u" ? PASSES.u : "", failed ? `fails ${counted(failed)} of ${counted(n)}` : "", some(lost, PASSES.n), some(unjudged, PASSES.u)].filter(Boolean).join(", ");
+  return [v === "p" ? `passes ${counted(passed)}` : "", v === "u" ? PASSES.u : "", failed ? `fails ${counted(failed)} of ${counted(n)}` : "", some(flaky, "flaky"), some(lost, PASSES.n), some(unjudged, PASSES.u)].filter(Boolean).join(", ");
 }
 
 // A bar of numbers that pass, fail, did not run and are not judged.
 export function bar(numbers) {
   const total = numbers.reduce((sum, n) => sum + n, 0);
-  const parts = ["passed", "failed", "lost", "unjudged"].map((kind, k) => {
+  const parts = ["passed", "failed", "lost", "unjudged", "unjudged"].map((kind, k) => {
     const part = element("i", { class: kind });
-    part.style.flexGrow = `${numbers[k] / Math.max(1, total)}`;
+    part.style.flexGrow = `${(numbers[k] ?? 0) / Math.max(1, total)}`;
     return part;
   });
   return element("span", { class: "share", "aria-hidden": "true" }, ...parts.filter((_, k) => numbers[k]));

@@ -224,6 +224,7 @@ def bound(
     modes: int,
     ego: str,
     baseline: str = "",
+    in_repeats: int = 0,
 ) -> Bound:
     """Return the bound of the space, in figures and in words."""
     fails = f"{ego} fails, and {baseline} does not," if baseline else f"{ego} fails"
@@ -244,6 +245,12 @@ def bound(
         text = (
             f"{fails} in {space.harmful} of {space.rows} fresh random draws, though in none of "
             f"{evaluations} evaluations: {_margin(least)}; {_of_the_space(space, such)}."
+        )
+    elif in_repeats:
+        verdict = "fails"
+        text = (
+            f"{fails} in repeats of {in_repeats} of the evaluations that came nearest to failing, "
+            f"though in none of {evaluations} evaluations at first: {_of_the_space(space, such)}."
         )
     # A run that says nothing of its driver must not pass: 6 of 27 such runs were once called "no
     # failure found".
@@ -266,6 +273,7 @@ def bound(
         least=least,
         verdict=verdict,
         not_counted=besides.sentence,
+        in_repeats=in_repeats,
         sentence=text,
     )
 

@@ -3,6 +3,7 @@
 Every list has a limit, so that the size of the record does not depend on the length of the run.
 """
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,6 +13,7 @@ from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import FileFormatError
 from bridgegen.base.records import read_model
+from bridgegen.base.statistics import beta_binomial, confidence_sequence
 
 JSON_FILE = "triage.json"
 """File of the triage's record in a run's folder."""
@@ -314,6 +316,63 @@ class StepCheck(_Model):
         )
 
 
+class Repeated(_Model):
+    """An evaluation that was made again, as the driver or the simulator may not repeat.
+
+    Attributes:
+        evaluation: its number.
+        failed: whether it did. It was chosen for that, so it is not counted itself.
+        repeats: further evaluations that have a verdict.
+        fails: of them.
+        lost: further ones without a result, or with implausible traffic.
+        mode: number of the failure mode that it is of; 0 of none.
+    """
+
+    evaluation: Count
+    failed: bool = False
+    repeats: Count = 0
+    fails: Count = 0
+    lost: Count = 0
+    mode: Count = 0
+
+    @property
+    def probability(self) -> float:
+        """P(fail | scenario): the mean of what the repeats leave of an even prior."""
+        return (self.fails + 1.0) / (self.repeats + 2.0)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether all repeats have the verdict of the first evaluation."""
+        return self.fails == self.repeats * self.failed
+
+    @property
+    def sentence(self) -> str:
+        """The result in words."""
+        lost = f", {self.lost} more without a result" if self.lost else ""
+        return repeats_sentence(self.fails, self.repeats) + lost
+
+
+def repeats_sentence(fails: int, repeats: int) -> str:
+    """Return how many repeats fail, in words, with P(fail) and its interval."""
+    low, high = confidence_sequence(fails, repeats)
+    mean = (fails + 1.0) / (repeats + 2.0)
+    return f"fails in {fails} of {repeats} repeats (P {mean:.2f}, 95 %: {low:.2f} to {high:.2f})"
+
+
+def repeats_needed(fails: int, repeats: int) -> int | None:
+    """Return how many repeats tell at 95 % whether it mostly fails, if this share of them fails.
+
+    None: more than 1,000, since about half of them fail; or there are none yet.
+    """
+    numbers = range(repeats, 1001 if repeats else 0)
+    return next((n for n in numbers if is_decided(round(fails / repeats * n), n)), None)
+
+
+def is_decided(fails: int, repeats: int) -> bool:
+    """Whether it is known at 95 % if it mostly fails: 0.5 is not in `confidence_sequence`."""
+    return 20 * (repeats + 1) * math.comb(repeats, fails) <= 1 << repeats
+
+
 def _kind(one: AtStep) -> str:
     if not one.ok:
         return "no result"
@@ -522,6 +581,7 @@ class Bound(_Model):
         not_counted: the collisions, near misses and evaluations that do not count as failures,
             with their reasons; "" where there are none.
         sentence: in words.
+        in_repeats: evaluations that passed at first and fail in a repeat.
     """
 
     evaluations: Count
@@ -533,6 +593,7 @@ class Bound(_Model):
     verdict: Verdict | Literal[""] = ""
     not_counted: Text = ""
     sentence: Text
+    in_repeats: Count = 0
 
     @property
     def in_full(self) -> str:
@@ -541,8 +602,9 @@ class Bound(_Model):
 
     @property
     def failures(self) -> int:
-        """Harmful evaluations; if there are none, harmful ones of the fresh random draws."""
-        return self.harmful or (self.space.harmful if self.space.drawn == "fresh" else 0)
+        """Harmful evaluations; without any, those of the fresh random draws, or of repeats."""
+        drawn = self.space.harmful if self.space.drawn == "fresh" else 0
+        return self.harmful or drawn or self.in_repeats
 
     @property
     def judged(self) -> bool:
@@ -580,6 +642,8 @@ class Triage(_Model):
         beyond: exported evaluations outside the region that a dossier calls validated.
         extrapolated: likewise, as a warning; "" where none is, or no dossier was found.
         rate: how likely harm is; None where the run does not estimate it.
+        repeated: evaluations that were made again (``--repeats``): exported ones, those that stand
+            for modes, further worst ones of each, and some that came near to failing.
     """
 
     schema_version: Literal[1] = 1
@@ -603,6 +667,7 @@ class Triage(_Model):
     beyond: Annotated[tuple[Count, ...], Field(max_length=10_000)] = ()
     extrapolated: Text = ""
     rate: Rate | None = None
+    repeated: Annotated[tuple[Repeated, ...], Field(max_length=MOST_NEIGHBOURHOODS)] = ()
 
     @model_validator(mode="after")
     def _consistent(self) -> "Triage":
@@ -620,6 +685,7 @@ class Triage(_Model):
         named = [i for mode in self.modes for i in (mode.worst, mode.shown, *mode.examples)]
         named += [neighbourhood.evaluation for neighbourhood in self.neighbourhoods]
         named += [check.evaluation for check in self.step_checks]
+        named += [item.evaluation for item in self.repeated]
         # A record may be damaged or another's: readers index the store's rows by these numbers.
         if max(named, default=-1) >= self.bound.evaluations:
             raise ValueError(f"evaluation {max(named)} must be one of the run's")
@@ -634,11 +700,23 @@ class Triage(_Model):
         """Return the results of an evaluation at fractions of the time step, if it was checked."""
         return next((item for item in self.step_checks if item.evaluation == evaluation), None)
 
+    def of_repeats(self, evaluation: int) -> Repeated | None:
+        """Return the results of an evaluation's repeats, if it was made again."""
+        return next((item for item in self.repeated if item.evaluation == evaluation), None)
+
+    def chance(self, mode: Mode) -> tuple[float, float, float] | None:
+        """Return P(fail | scenario) of a mode's repeated rows: the mean, and its 95 % interval."""
+        some = [item for item in self.repeated if item.mode == mode.number and item.repeats]
+        fails, repeats = [item.fails for item in some], [item.repeats for item in some]
+        return beta_binomial(fails, repeats) if some else None
+
     def doubts(self, evaluation: int) -> str:
         """Return what makes the verdict on an evaluation doubtful; "" if nothing is known to."""
         check, beyond = self.step_check(evaluation), evaluation in self.beyond
+        again = self.of_repeats(evaluation)
         return ", ".join(
-            ["depends on the time step"] * (check is not None and not check.stable)
+            ([] if again is None or again.agrees else [again.sentence])
+            + ["depends on the time step"] * (check is not None and not check.stable)
             + ["outside the validated region"] * beyond
         )
 
@@ -663,9 +741,13 @@ def write_record(folder: Path, triage: Triage) -> Path:
         StorageError: it cannot be written.
     """
     path = folder / JSON_FILE
-    # As in runs that estimate no rates.
-    none: Any = None if triage.rate else {"rate": True, "modes": {"__all__": {"probability"}}}
-    write_whole(path, [triage.model_dump_json(indent=1, exclude=none).encode(), b"\n"])
+    # Without rates and repeats the record is as it was before there were any.
+    unused: dict[str, Any] = {}
+    if not triage.rate:
+        unused |= {"rate": True, "modes": {"__all__": {"probability"}}}
+    if not triage.repeated:
+        unused |= {"repeated": True, "bound": {"in_repeats"}}
+    write_whole(path, [triage.model_dump_json(indent=1, exclude=unused or None).encode(), b"\n"])
     return path
 
 

@@ -1,5 +1,6 @@
 """From a run's rows to findings: modes, their neighbours, minimal scenarios, and a bound."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -15,6 +16,7 @@ from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.assess.conflict.quantities import HARM
 from bridgegen.assess.metrics import OF_BASELINE
 from bridgegen.base.arrays import Bool, Float, Int, Numbers
+from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.trials import EVENT
 from bridgegen.results.store import Recorded, Rows
@@ -62,9 +64,11 @@ from bridgegen.search.triage.record import (
     Mode,
     Neighbourhood,
     Rate,
+    Repeated,
     StepCheck,
     Triage,
 )
+from bridgegen.search.triage.repeats import repeated
 from bridgegen.search.triage.time_steps import step_checks
 from bridgegen.search.triage.what_happened import COPY, apart, distinct, of_events, of_results
 
@@ -98,6 +102,8 @@ def triage(
     effort: Effort = FULL,
     domain: str = "",
     drawn: DrawnRows | None = None,
+    repeats: int = 1,
+    known: Sequence[Repeated] = (),
 ) -> Triaged:
     """Group a run's harmful rows into failure modes, and test the robustness of each finding.
 
@@ -114,8 +120,13 @@ def triage(
         effort: how much is tested.
         domain: a sentence if the driver is not made for the scenario.
         drawn: the rows as they were drawn, of a run that estimates rates.
+        repeats: how often a finding is evaluated again at most, to estimate how likely it fails; 1:
+            not at all.
+        known: repeats of an earlier triage of the same run.
     """
-    return _Triage(pipeline, rows, algorithm, seed, keep, chosen, effort, domain, drawn).run()
+    made = _Triage(pipeline, rows, algorithm, seed, keep, chosen, effort, domain, drawn)
+    made.repeats, made.again = repeats, {item.evaluation: item for item in known}
+    return made.run()
 
 
 def harmful_rows(
@@ -143,6 +154,9 @@ def harmful_rows(
 class _Triage:
     """One call of `triage`; positions are those among all rows unless stated otherwise."""
 
+    repeats: int
+    again: dict[int, Repeated]
+
     def __init__(
         self,
         pipeline: Pipeline,
@@ -160,15 +174,7 @@ class _Triage:
         self._pipeline, self._rows, self._space = pipeline, rows, pipeline.space
         self._algorithm, self._seed, self._keep = algorithm, seed, keep
         self._chosen, self._domain = chosen, domain
-        name = pipeline.objective.harm
-        harmful, self._harm = harmful_rows(
-            rows.metrics, pipeline.metrics, name, rows.status, rows.findings
-        )
-        # A search for one cause has found only what is critical for it.
-        if pipeline.cause is not None:  # harm of another cause does not count
-            harmful &= rows.critical
-        if pipeline.baseline is not None:  # nor does what the baseline's driver fails in, too
-            harmful &= ~_baseline_fails(pipeline, rows)
+        harmful, self._harm = self._counted(rows)
         self._at = np.flatnonzero(harmful)
         self._U: Float = rows.U[self._at]
         self._found: dict[int, Neighbourhood] = {}
@@ -177,6 +183,18 @@ class _Triage:
         self._unrecorded = 0
         self._preventable: dict[int, bool | None] = {}
         self._event: Float = np.zeros((0, len(EVENT)))
+
+    def _counted(self, rows: Rows | Recorded | Evaluation) -> tuple[Bool, Float]:
+        """Return which rows are a failure that counts in this run, and the harm of each."""
+        pipeline = self._pipeline
+        of = rows.metrics, pipeline.metrics, pipeline.objective.harm, rows.status, rows.findings
+        harmful, harm = harmful_rows(*of)
+        # A search for one cause has found only what is critical for it.
+        if pipeline.cause is not None:  # harm of another cause does not count
+            harmful &= rows.critical
+        if pipeline.baseline is not None:  # nor does what the baseline's driver fails in, too
+            harmful &= ~_baseline_fails(pipeline, rows)
+        return harmful, harm
 
     def run(self) -> Triaged:
         """Run the stages."""
@@ -193,6 +211,8 @@ class _Triage:
         if tests:
             shown = self._test_robustness(groups, U, harm)
         exports = self._choose(shown, U, harm)
+        if self.repeats > 1:
+            exports = self._repeat(exports, shown, harm)
         tested = list(dict.fromkeys([*exports, *shown[: self._effort.tested]]))
         sample = self._sample(tested) if tests else []
         if tests:
@@ -200,6 +220,8 @@ class _Triage:
             self._test(sample, sampled=True)
         groups, shown = self._by_tested_cause(groups, shown, U, harm)
         order = sorted(range(len(groups)), key=lambda k: self._rank(shown[k], harm))
+        if self.repeats > 1:  # equal ones stay as they are
+            order.sort(key=lambda k: self._risk(groups[k], shown[k]))
         groups, shown = [groups[k] for k in order], [shown[k] for k in order]
         minimal = self._minimal(groups, shown) if tests else [None] * len(groups)
         record = self._record(groups, shown, exports, tested, sample, minimal)
@@ -278,6 +300,39 @@ class _Triage:
             self._check_steps([*first, *more])
         return sorted([*first, *more], key=lambda i: self._rank(i, harm))
 
+    def _repeat(self, exports: Sequence[int], shown: Sequence[int], harm: Float) -> list[int]:
+        """Evaluate findings again; return the rows to export, the likeliest and worst first."""
+        rows, chosen = self._rows, self._chosen or ()
+        some = self._at[list(dict.fromkeys([*exports, *shown, *self._found]))].tolist()
+        failed = np.isin(np.arange(len(rows.id)), [*self._at, *chosen])
+        # What passed once may fail: those that came nearest, so that no flaky one is called safe.
+        passed = np.flatnonzero((rows.status == 0) & ~_implausible(rows) & ~failed)
+        beside = passed[np.argsort(-self._harm[passed], kind="stable")][: self._keep].tolist()
+        at = list(dict.fromkeys([*chosen, *some, *beside]))
+        ids = zip(rows.id[at].tolist(), failed[at].tolist(), strict=True)
+        first = [self.again.get(i) or Repeated(evaluation=i, failed=has) for i, has in ids]
+        self.again = repeated(self._pipeline, rows.X[at], first, self.repeats, self._fails)
+        key = {i: -self._chance([i]) * float(harm[i]) for i in exports}
+        return list(exports) if chosen else sorted(exports, key=key.__getitem__)
+
+    def _fails(self, evaluation: Evaluation) -> Bool:
+        """Return which rows of an evaluation fail: by harm, or by what else chooses exports."""
+        harmful = self._counted(evaluation)[0]
+        return harmful if self._chosen is None else harmful | evaluation.critical
+
+    def _chance(self, some: Sequence[int]) -> float:
+        """Return P(fail) of the repeated ones of some harmful rows, on average; 1 without any."""
+        ids = self._rows.id[self._at[list(some)]].tolist()
+        known = [self.again[i].probability for i in ids if i in self.again]
+        return sum(known) / len(known) if known else 1.0
+
+    def _risk(self, item: Group, i: int) -> tuple[float, float]:
+        """Return the sort key of modes by P(fail) × severity × exposure; equal ones by harm."""
+        # Exposure: how often its weather is met. A share of the space contains P(fail) already.
+        bands = self._space.bands(self._space.values(self._rows.X[self._at[i]]))
+        likely = self._chance(item.rows.tolist()) * math.exp(-surprise(bands))
+        return -likely * self._severity(item), -likely * float(self._harm[self._at[i]])
+
     def _sample(self, tested: Sequence[int]) -> list[int]:
         """Return some of the harmful rows that are not tested yet, drawn at random."""
         rest = np.setdiff1d(np.arange(len(self._at)), tested)
@@ -315,6 +370,11 @@ class _Triage:
         self._steps |= dict(zip(new, found, strict=True))
         return bool(new)
 
+    def _is_flaky(self, i: int) -> bool:
+        """Whether repeats change the verdict on a row: then a finer step is not why it changes."""
+        again = self.again.get(int(self._rows.id[self._at[i]]))
+        return again is not None and not again.agrees
+
     def _unharmed(self) -> list[StepCheck]:
         """Check rows without failure, evenly spread over the run."""
         rows, rest = self._rows, np.ones(len(self._rows.id), np.bool_)
@@ -328,7 +388,7 @@ class _Triage:
 
     def _doubts(self, i: int) -> tuple[bool, bool]:
         """Return whether a row's verdict depends on the time step, and whether it is knife-edge."""
-        hangs = i in self._steps and not self._steps[i].stable
+        hangs = i in self._steps and not self._steps[i].stable and not self._is_flaky(i)
         return hangs, i in self._found and self._found[i].knife_edge
 
     def _rank(self, i: int, harm: Float) -> tuple[Any, ...]:
@@ -464,6 +524,8 @@ class _Triage:
                     probability=self._how_likely(self._at[item.rows]),
                 )
             )
+        of = {i: k for k, g in enumerate(groups, 1) for i in ids[g.rows].tolist()}
+        again = [item.model_copy(update={"mode": of.get(i, 0)}) for i, item in self.again.items()]
         ok = rows.status == 0
         implausible = _implausible(rows)
         known = [self._found[i] for i in dict.fromkeys([*tested, *sample]) if i in self._found]
@@ -489,6 +551,7 @@ class _Triage:
                     rows.metrics, pipeline.metrics, self._harm, rows.id, ok & ~implausible,
                 ),
                 modes=len(modes), ego=pipeline.driver.label, baseline=baseline,
+                in_repeats=sum(item.fails > 0 and not item.failed for item in again),
             ),
             modes=tuple(modes), unrecorded_modes=self._unrecorded,
             neighbourhoods=tuple(known),
@@ -497,9 +560,13 @@ class _Triage:
             ),
             untested=untested, fresh=fresh, rate=self._rate(),
             step_checks=tuple(
-                [self._steps[i] for i in dict.fromkeys([*shown, *exports]) if i in self._steps]
+                [
+                    self._steps[i] for i in dict.fromkeys([*shown, *exports])
+                    if i in self._steps and not self._is_flaky(i)
+                ]
                 + (self._unharmed() if self._tests else [])
             ),
+            repeated=tuple(again),
         )  # fmt: skip
 
     def _how_likely(self, at: Int) -> Frequency | None:
@@ -543,6 +610,10 @@ class _Triage:
                 self._found[i] = near.model_copy(update={"judgement": text})
 
     def _judgement(self, i: int, cause: str) -> str:
+        if cause == "sensitive" and self._is_flaky(i):  # its parameters need not change for that
+            again = self.again[int(self._rows.id[self._at[i]])]
+            passes = f"{again.repeats - again.fails} of {again.repeats} repeats"
+            return f"root cause not known: the same scenario passes in {passes}"
         return judgement(
             cause,
             self._found.get(i),
@@ -578,7 +649,7 @@ class _Triage:
         return f"{text}, {names[k]} {parameter.kind.span_text(low, high, '{:.3g}'.format, unit)}"
 
 
-def _baseline_fails(pipeline: Pipeline, rows: Rows | Recorded) -> Bool:
+def _baseline_fails(pipeline: Pipeline, rows: Rows | Recorded | Evaluation) -> Bool:
     """Return which rows the baseline's driver fails in, ``(N,)``, or has no usable result of."""
     column = rows.metrics[:, pipeline.metrics.index(f"{OF_BASELINE}{HARM}")]
     # Written so that a baseline without a result counts as failing: the row shows no difference.

@@ -44,7 +44,7 @@ def mode_in_words(mode: Mode, found: Triage) -> str:
         parts.append(f"harm {mode.harm:.2f}")
     parts.append(f"P {mode.probability.sentence}" if mode.probability else "")
     parts.append(robustness_in_words(mode, found))
-    parts.append(step_in_words(mode, found))
+    parts += [step_in_words(mode, found), repeats_in_words(mode, found)]
     parts.append(mode.judgement or mode.cause)
     if mode.space.drawn and mode.space.share is not None:
         low, high = percent(mode.space.low), percent(mode.space.high)
@@ -65,6 +65,27 @@ def step_in_words(mode: Mode, found: Triage) -> str:
     """Return how the verdict on the evaluation that stands for a mode hangs on the time step."""
     check = found.step_check(mode.shown)
     return check.sentence if check else ""
+
+
+def repeats_in_words(mode: Mode, found: Triage) -> str:
+    """Return how many repeats of the evaluation that stands for a mode fail, and of its rows."""
+    again, chance = found.of_repeats(mode.shown), found.chance(mode)
+    if again is None or chance is None:
+        return ""
+    rows = sum(item.mode == mode.number for item in found.repeated)
+    of_all = "of {} rows P {:.2f}, 95 %: {:.2f} to {:.2f}".format(rows, *chance)
+    return f"{again.sentence}; {of_all}" if rows > 1 else again.sentence
+
+
+def all_repeats_in_words(found: Triage) -> str:
+    """Return how many evaluations repeat their verdict, in words; "" if none was made again."""
+    again, lost = [i for i in found.repeated if i.repeats], sum(i.lost for i in found.repeated)
+    changed = [item for item in again if not item.agrees]
+    passed = sum(not item.failed for item in changed)
+    text = f"{len(changed) or 'none'} of {len(again)} scenarios that were evaluated again change "
+    text += f"their verdict{f' ({passed} passed at first)' if passed else ''}"
+    text += f"; {lost} repeats without a result" if lost else ""
+    return text if found.repeated else ""
 
 
 def steps_in_words(found: Triage) -> str:
@@ -97,6 +118,9 @@ def robustness_in_words(mode: Mode, found: Triage) -> str:
     if near is None or not near.rows:
         return f"also fails in {percent(mode.robustness)} of its nearby scenarios"
     if mode.knife_edge:
+        again = found.of_repeats(mode.shown)
+        if again is not None and not again.agrees:  # no edge: it passes without any change
+            return f"fails in {near.harmful} of {near.rows} nearby scenarios"
         return f"knife-edge: fails in only {near.harmful} of {near.rows} nearby scenarios"
     share = "all " if near.harmful == near.rows else f"{near.harmful} of "
     return f"also fails in {share}{near.rows} nearby scenarios"

@@ -22,7 +22,7 @@ from bridgegen.drivers.drivers import DEMAND, SCRIPTED, STAGES, STORYBOARD, TEST
 from bridgegen.drivers.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.drivers.kinds import DETECTION, NEEDS_ROOM
 from bridgegen.drivers.lane_tables import STRAYS
-from bridgegen.drivers.noise import noise_key
+from bridgegen.drivers.noise import driver_seeds, noise_key
 from bridgegen.drivers.user_drivers import Traits
 from bridgegen.drivers.views import frames
 from bridgegen.simulation.embedded import _memory_kernels as memory
@@ -70,11 +70,13 @@ class Batch:
         noise: ``(N,)`` uint64, keys of the rows' random numbers; see `noise_keys`.
         until_collision: whether a row ends once the ego collides, see ``_collision_kernels``; not
             where there are trailers, whose boxes may overlap the one of what tows them.
+        repeat: which evaluation of the rows it is, for the seeds of a user's driver.
 
     Attributes:
         record: x, y, h, v, a, offset ``(N, E, T)`` and more, up to the present instant.
         state: all else that a driver may look at; see ``_memory_kernels.State``.
         plan: the compiled storyboard, with the addresses that this process needs.
+        seeds: ``(N,)`` of a user's driver; see `driver_seeds`.
 
     Raises:
         InputError: a road network that is not there, or a value that is not finite.
@@ -89,6 +91,7 @@ class Batch:
         own: Traits | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
+        repeat: int = 0,
     ) -> None:
         n = len(rows)
         if n and not (rows.min() >= 0 and rows.max() < roads.n_networks):
@@ -99,6 +102,7 @@ class Batch:
         # A key depends on the row's values alone: so its random numbers are the same in any batch,
         # in any order, and on any worker.
         key = noise_keys(program, values, n) if noise is None else noise
+        self.seeds = driver_seeds(key, repeat)
         state = _state(program, roads, rows, slots, key, own)
         # One block, since ``_do`` copies the state before every call: that took a fifth off the 99
         # ms of a row in esmini.

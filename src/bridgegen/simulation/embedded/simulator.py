@@ -223,6 +223,7 @@ class EmbeddedSimulator:
         kinematic: bool = False,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
+        repeat: int = 0,
     ) -> Rollout:
         """See `Simulator`; runs without the GIL.
 
@@ -235,6 +236,7 @@ class EmbeddedSimulator:
             kinematic: whether the ego's vehicle is, whatever its own is.
             noise: ``(N,)`` keys of the rows' random numbers; see ``noise_keys``.
             until_collision: whether a row ends soon after the ego collides; see `Batch`.
+            repeat: which evaluation of the rows it is; see `Batch`.
 
         Raises:
             InputError: see `Simulator`; or a user's driver that cannot be made, or a driver that
@@ -267,6 +269,7 @@ class EmbeddedSimulator:
             kinematic=kinematic,
             noise=noise,
             until_collision=until_collision,
+            repeat=repeat,
         )
         return self._own.drive(chosen.changed(dry=dry, kinematic=kinematic), some, len(rows))
 
@@ -406,6 +409,7 @@ class EmbeddedSimulator:
         own: Traits | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
+        repeat: int = 0,
     ) -> "Batch":
         """Set N rows up, for a driver that is asked at every instant.
 
@@ -419,12 +423,13 @@ class EmbeddedSimulator:
             own: what a driver of the user's own needs; None without one.
             noise: likewise.
             until_collision: likewise.
+            repeat: likewise.
         """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
         program = self.program.changed(driver=driver, dry=dry, kinematic=kinematic)
         if not self.partners:
-            return Batch(program, roads, rows, values, own, noise, until_collision)
+            return Batch(program, roads, rows, values, own, noise, until_collision, repeat)
         from bridgegen.simulation.embedded.together import Together
 
         keys = self.noise_keys(values, len(rows)) if noise is None else noise
@@ -432,8 +437,8 @@ class EmbeddedSimulator:
         for simulator, network in zip(self.partners, roads.partners, strict=True):
             there = simulator.program.changed(driver=driver, dry=dry, kinematic=kinematic)
             its = keys ^ noise_key({there.names[0]: 0.0}, 1)  # sensors err independently
-            other = Batch(there, network, rows, values, own, its)
+            other = Batch(there, network, rows, values, own, its, repeat=repeat)
             wheel = partial(getattr, other, "demand")
             found.append((other, partial(simulator._own.wheel, there, other) if own else wheel))
         # A row in which one vehicle collides goes on for the other.
-        return Together(found, program, roads, rows, values, own, keys)
+        return Together(found, program, roads, rows, values, own, keys, False, repeat)

@@ -141,6 +141,8 @@ class Wheel:
                 maps = tuple(map(mirror.road_map, maps))
             self._scene = replace(self._scene, maps=maps, map_of=map_of)
             self._nearby, self._places = np.zeros((n, MEMORY)), np.full((n, 1 + NEAR_PIECES), -1)
+        if "seed" in wants:
+            self._scene = replace(self._scene, seed=batch.seeds)
         self._views: dict[str, npt.NDArray[Any]] = {}
         if "lanes" in wants:
             self._views["lanes"] = np.zeros((n, LANES))
@@ -237,7 +239,8 @@ class Wheel:
         Raises:
             DriverError: it failed.
         """
-        both = replace(self._scene, map_of=np.repeat(self._scene.map_of, 2))
+        scene = self._scene
+        both = replace(scene, map_of=np.repeat(scene.map_of, 2), seed=np.repeat(scene.seed, 2))
         self._driver.reset(2, both)
         twice = {word: np.repeat(view, 2, axis=0) for word, view in self._views.items()}
         seen = observation.take(np.zeros(2, dtype=np.int64))
