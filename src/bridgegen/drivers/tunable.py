@@ -13,8 +13,8 @@ from typing import Any
 from bridgegen.base.errors import FileFormatError, InputError, UnknownNameError
 from bridgegen.drivers.address import is_remote
 
-MOST = 64
-"""Largest number of tunable numbers of a driver."""
+MOST, SHAPE = 64, "(default, low, high) or (default, low, high, unit), finite numbers"
+"""Largest number of tunable numbers of a driver, and what each of them has."""
 
 Settings = tuple[tuple[str, float], ...]
 """Names of tunable numbers, and their values; those that are not named have their defaults."""
@@ -44,38 +44,29 @@ class Tunable:
 
 
 def checked_tunable(said: Any) -> tuple[Tunable, ...]:
-    """Return the tunable numbers that a driver declares; None declares none.
+    """Return the tunable numbers that a driver declares; none of None.
 
     Raises:
-        InputError: one has no name, no range, or its default lies outside; all that do.
+        InputError: one has no range, or its default lies outside; all that do.
     """
-    if said is None:
-        return ()
-    if not isinstance(said, Mapping) or not 0 < len(said) <= MOST:
+    if not isinstance(said, Mapping | None) or len(said or ()) > MOST:
         raise InputError(
-            f"tunable must be a mapping of 1 to {MOST} names to (default, low, high) or (default, "
-            f"low, high, unit), got {ascii(said)[:80]}"
+            f"tunable must map at most {MOST} names to {SHAPE}, got {ascii(said)[:80]}"
         )
     found, problems = [], []
-    for name, stated in said.items():
-        parts = tuple(stated) if isinstance(stated, list | tuple) else ()
-        unit = parts[3] if len(parts) == 4 else ""
-        numbers = [_number(part) for part in parts[:3]]
-        is_whole = len(parts) in (3, 4) and isinstance(unit, str) and len(unit) <= 20
-        if not (isinstance(name, str) and name.isidentifier() and is_whole) or None in numbers:
-            problems.append(
-                f"tunable: {ascii(name)[:80]} must be a name with (default, low, high) or "
-                f"(default, low, high, unit), finite numbers, got {ascii(stated)[:80]}"
-            )
+    for name, stated in (said or {}).items():
+        parts = stated if isinstance(stated, list | tuple) else ()
+        numbers, unit = [_number(part) for part in parts[:3]], "".join(map(str, parts[3:]))
+        if len(parts) not in (3, 4) or None in numbers or not str(name).isidentifier():
+            problems.append(f"tunable: {name!s:.80} must have {SHAPE}, got {ascii(stated)[:80]}")
             continue
-        default, low, high = (float(number or 0.0) for number in numbers)
+        default, low, high = (float(part) for part in parts[:3])
         if not (low < high and low <= default <= high):
-            of = f"{name} [{unit}]" if unit else name
             problems.append(
-                f"tunable: low < high and low <= default <= high must hold for {of}, got "
-                f"default={default:g}, low={low:g}, high={high:g}"
+                f"tunable: low < high and low <= default <= high must hold for {name} "
+                f"[{unit or '1'}], got default={default:g}, low={low:g}, high={high:g}"
             )
-        found.append(Tunable(name, default, low, high, unit))
+        found.append(Tunable(str(name), default, low, high, unit[:20]))
     if problems:
         raise InputError(*problems)
     return tuple(found)
