@@ -134,8 +134,10 @@ class Repair:
         """Return the sentence, the numbers, what is left, comfort, and the files."""
         of, tables = self.record["figures"], self.tables
         return [
-            *(self.sentence, "", tables["numbers"], ""),
-            *([tables["left"], ""] if tables["left"].rows else []),
+            self.sentence,
+            "",
+            *tables.values(),
+            "",
             f"  {'robust modes':<16}{of['modes_gone']} of {of['modes']} gone",
             f"  {'mean jerk':<16}{of['jerk'] - 1.0:+.1%}",
             f"  {'travel time':<16}{of['travel_time'] - 1.0:+.1%}",
@@ -159,10 +161,10 @@ class Repair:
         """
         of, found = self.record["figures"], self.held_out.difference if self.held_out else None
         kind = "open" if found is None else "fails" if of["broken"] or of["new"] else ""
-        rates = [
-            (name, count, " to ".join(map(percent, found.interval(name))))
-            for name, count in (found.counts.items() if found else ())
-        ]
+        rates = []
+        if found is not None:
+            for change, count in found.counts.items():
+                rates.append((change, count, " to ".join(map(percent, found.interval(change)))))
         write_whole(self.folder / RESULT, [json.dumps(self.to_json(), indent=1).encode()])
         write_page(
             self.folder / PAGE,
