@@ -1,12 +1,14 @@
-"""Drivers with tunable numbers: one that begins to brake too late, one that declares nonsense."""
+"""Drivers with tunable numbers: one that may not brake enough, one that declares nonsense."""
+
+from typing import ClassVar
 
 import numpy as np
 
 
-class BrakesLate:
-    """Brakes once the gap is below the way that it takes to the other's speed, and a margin."""
+class BrakesTooLittle:
+    """Brakes as much as it must behind who is ahead, but by no more than a limit."""
 
-    tunable = {"margin": (0.0, 0.0, 2.0, "s"), "braking": (6.0, 1.0, 8.0, "m/s²")}
+    tunable: ClassVar = {"limit": (1.5, 1.0, 8.0, "m/s²"), "from_": (1.0, 0.5, 1.4, "m/s²")}
 
     def reset(self, n, scene):
         self.scene = scene
@@ -20,17 +22,18 @@ class BrakesLate:
         ahead, beside = tx * cosine + ty * sine, ty * cosine - tx * sine
         gap = ahead - self.scene.centre - 0.5 * self.scene.length - 0.5 * o.tracks[:, :, 6]
         closing = np.maximum(0.0, v - o.tracks[:, :, 4] * cosine - o.tracks[:, :, 5] * sine)
-        margin, braking = self.settings["margin"], self.settings["braking"]
-        near = gap < 1.0 + margin * v + closing**2 / (2.0 * braking)
-        near &= (o.tracks[:, :, 0] >= 2.0) & (np.abs(beside) < 2.0) & (ahead > 0.0)
-        hold = np.clip(o.target_speed - o.v, -2.0, 2.0)
-        return np.where(near.any(axis=1), -braking, hold), curvature
+        must = closing**2 / (2.0 * np.maximum(gap - 3.0, 0.1))
+        seen = (o.tracks[:, :, 0] >= 2.0) & (np.abs(beside) < 2.0) & (ahead > 0.0)
+        must = np.where(seen, must, 0.0).max(axis=1)
+        brakes = -np.minimum(must, self.settings["limit"])
+        hold = np.clip(o.target_speed - o.v, -2.0, 1.0)
+        return np.where(must > self.settings["from_"], brakes, hold), curvature
 
 
-class Fixed(BrakesLate):
+class Fixed(BrakesTooLittle):
     tunable = None
-    settings = {"margin": 0.0, "braking": 6.0}
+    settings: ClassVar = {"limit": 6.0, "from_": 1.0}
 
 
-class Misdeclared(BrakesLate):
-    tunable = {"margin": (3.0, 0.0, 2.0, "s")}
+class Misdeclared(BrakesTooLittle):
+    tunable: ClassVar = {"limit": (9.0, 1.0, 8.0, "m/s²")}
