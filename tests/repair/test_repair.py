@@ -19,8 +19,10 @@ from bridgegen.drivers.tunable import (
     values_of,
 )
 from bridgegen.engine.workers import CarriedDriver
+from bridgegen.jobs.repair import repair
 from bridgegen.jobs.repair.repair import repair_driver
 from bridgegen.jobs.repair.tune import CHANGES, FAILS, PASSES, TIME, WAY, WORST, Bench, Rows
+from bridgegen.jobs.search import Run
 from bridgegen.jobs.search.scenarios import load
 
 DRIVERS = Path(__file__).with_name("drivers.py")
@@ -189,10 +191,12 @@ def test_a_driver_without_tunable_numbers_is_refused(ego, named, tmp_path):
     assert not (tmp_path / "a").exists()
 
 
-def test_where_nothing_fails_there_is_nothing_to_repair(tmp_path, monkeypatch):
+def test_where_nothing_fails_there_is_nothing_to_repair(repaired, tmp_path, monkeypatch):
     def passes(self, rows, values):
         return np.eye(6)[np.full(len(rows.X), PASSES)]
 
+    run = Run(repaired.folder / "rounds/0/cut-in")
+    monkeypatch.setattr(repair._Repairer, "_search", lambda self, job, number: run)
     monkeypatch.setattr(Bench, "drive", passes)
     with refuses(InputError, "no failure", "cut-in"):
-        repair_driver("cut-in", egos=OWN, budget=4, out=tmp_path / "a")
+        repair_driver("cut-in", egos=OWN, out=tmp_path / "a")
