@@ -34,6 +34,7 @@ from bridgegen.jobs.suite.suite import check, default_folder
 from bridgegen.pages.templates import Banner, write_page
 from bridgegen.results.folder import claim
 from bridgegen.results.store.run_file import FILE
+from bridgegen.search.triage.record import NOT_JUDGED
 from bridgegen.simulation.choice import EMBEDDED
 
 SETTINGS, ROUNDS, PATCH, RESULT, PAGE = (
@@ -270,9 +271,11 @@ class _Repairer:
             rounds.append((sum(run.summary.evaluations for run in runs), len(fresh.X)))
             if number == 0 and not len(fresh.X):
                 names = ", ".join(job.entry.name for job in self.jobs)
+                found = [run.triage.bound for run in runs if run.triage]
+                whys = [bound.sentence for bound in found if bound.verdict == NOT_JUDGED]
                 raise InputError(
                     f"no failure of '{self.ego}' was found in {rounds[0][0]:,} evaluations of "
-                    f"{names}, so there is nothing to repair; try a larger --budget"
+                    f"{names}; " + ("; ".join(whys) or "try a larger --budget")
                 )
             bench.add(fresh)
             if not len(fresh.X) or number == given.rounds:
