@@ -36,6 +36,10 @@ GIVEN = {
         "files": ("cut-in",), "egos": ("careful", "reference"), "matrix": "none", "samples": 3,
         "seed": 4, "budget": 0,
     },
+    "repair": {
+        "files": ("cut-in",), "egos": ("careful",), "matrix": "none", "samples": 3, "seed": 4,
+        "budget": 5, "rounds": 2, "tries": 7,
+    },
     "dashboard": {
         "folder": Path("project"), "criteria": ["R-1: min(ego.v) < 3 m/s"], "update": True,
     },

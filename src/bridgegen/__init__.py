@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bridgegen.jobs.mine.mine import Mined, mine
     from bridgegen.jobs.preventability.preventability import map_preventability
     from bridgegen.jobs.preventability.result import PreventabilityMap
+    from bridgegen.jobs.repair.repair import Repair, repair_driver
     from bridgegen.jobs.risk.result import Risk
     from bridgegen.jobs.risk.risk import estimate_risk
     from bridgegen.jobs.safety_case.export import export_safety_case
@@ -40,6 +41,7 @@ __all__ = [
     "Mined",
     "Model",
     "PreventabilityMap",
+    "Repair",
     "Risk",
     "Run",
     "SafetyCase",
@@ -60,6 +62,7 @@ __all__ = [
     "mine",
     "model",
     "read_exposure",
+    "repair_driver",
     "resume",
     "run_search",
     "run_suite",
@@ -90,6 +93,8 @@ _HOMES = {
     "load": "bridgegen.jobs.search.run",
     "map_preventability": "bridgegen.jobs.preventability.preventability",
     "PreventabilityMap": "bridgegen.jobs.preventability.result",
+    "Repair": "bridgegen.jobs.repair.repair",
+    "repair_driver": "bridgegen.jobs.repair.repair",
     "Risk": "bridgegen.jobs.risk.result",
     "estimate_risk": "bridgegen.jobs.risk.risk",
     "resume": "bridgegen.jobs.search",

@@ -8,7 +8,15 @@ from tests.approval import refuses
 
 from bridgegen.base.compiled import call_at, kernel
 from bridgegen.base.errors import InputError
-from bridgegen.drivers.compiled import EGO, ROUTE, SCENE, TRACK, CompiledDriver, compiled_driver
+from bridgegen.drivers.compiled import (
+    EGO,
+    LANES,
+    ROUTE,
+    SCENE,
+    TRACK,
+    CompiledDriver,
+    compiled_driver,
+)
 
 
 def helper(x):
@@ -72,6 +80,28 @@ def test_the_machine_code_answers_as_the_function_does_in_python():
     assert memory.tolist() == [1.0]
     told = scene[0], ego[0], route.view(np.recarray), tracks.view(np.recarray), memory
     assert driver(*told) == (9.0, 2.0)
+
+
+def test_tunable_numbers_are_read_by_the_code_that_is_compiled_once():
+    @compiled_driver(wants=("lanes",), tunable={"headway": (1.5, 0.5, 3.0, "s"), "gain": (4, 0, 9)})
+    def drive(scene, ego, route, tracks, memory, lanes, settings):
+        return settings.headway * ego.v, settings.gain + lanes.ends
+
+    parts = [np.ones(kind.itemsize // 8) for kind in (SCENE, EGO)]
+    route, tracks, memory, answer = np.ones((3, 4)), np.ones((2, 13)), np.zeros(0), np.zeros(3)
+    lanes = np.full(LANES.itemsize // 8, 2.0)
+    rest = [lanes, *(np.zeros(0) for _ in range(5))]
+
+    @kernel
+    def call(address, given):
+        call_at(address, given)
+
+    for values, expected in (({}, [1.5, 6.0, 1.0]), ({"headway": 2.0}, [2.0, 6.0, 1.0])):
+        drive.set(values)
+        call(drive.address, (*parts, route, tracks, memory, answer, *rest))
+        assert answer.tolist() == expected
+    with refuses(InputError, "default=4"):
+        compiled_driver(tunable={"gain": (4.0, 0.0, 3.0)})
 
 
 def test_a_kernel_calls_any_c_function():

@@ -14,7 +14,17 @@ from bridgegen.engine.options.option import GROUPS
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 PANELS = {
-    "Search": ("demo", "search", "resume", "suite", "diff", "benchmark", "preventability", "risk"),
+    "Search": (
+        "demo",
+        "search",
+        "resume",
+        "suite",
+        "diff",
+        "repair",
+        "benchmark",
+        "preventability",
+        "risk",
+    ),
     "Look at results": (
         "open",
         "analyse",

@@ -33,6 +33,7 @@ from bridgegen.jobs.dashboard.options import JOB as DASHBOARD
 from bridgegen.jobs.frame import Job, JobResult
 from bridgegen.jobs.mine.options import JOB as MINE
 from bridgegen.jobs.preventability.options import JOB as PREVENTABILITY
+from bridgegen.jobs.repair.options import JOB as REPAIR
 from bridgegen.jobs.risk.options import JOB as RISK
 from bridgegen.jobs.safety_case.options import JOB as SAFETY_CASE
 from bridgegen.jobs.suite.options import DIFF, SUITE
@@ -41,6 +42,7 @@ JOBS = (
     COMPARE,
     SUITE,
     DIFF,
+    REPAIR,
     BENCHMARK,
     PREVENTABILITY,
     RISK,

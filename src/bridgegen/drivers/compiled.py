@@ -19,7 +19,7 @@ fields of ``SCENE``, ``EGO``, ``ROUTE`` and ``TRACK``: ``ego.v``, ``route[3].x``
 
 import inspect
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ from bridgegen.drivers.interface import (
     PIECE_POINTS,
     ROUTE_POINTS,
 )
+from bridgegen.drivers.tunable import Tunable, checked_tunable
 from bridgegen.drivers.user_drivers import checked_wants
 
 ANY = -1  # the size of an axis that depends on the scenario
@@ -138,6 +139,7 @@ class CompiledDriver:
     Attributes:
         memory: how many numbers it keeps between two instants.
         wants: words of `WANTS`, in the order of its arguments.
+        tunable: its numbers that may be set.
     """
 
     def __init__(
@@ -145,9 +147,13 @@ class CompiledDriver:
         function: Callable[..., tuple[float, float]],
         memory: int,
         wants: tuple[str, ...] = (),
+        tunable: tuple[Tunable, ...] = (),
     ) -> None:
         self._function = function
-        self.memory, self.wants = memory, wants
+        self.memory, self.wants, self.tunable = memory, wants, tunable
+        # Where the code reads them: other values need no other code.
+        self._settings = np.zeros(1, _record(*(item.name for item in tunable)))
+        self.set({item.name: item.default for item in tunable})
         self._code: Any = None  # keeps the machine code where it is
 
     def __call__(self, *arguments: Any) -> tuple[float, float]:
@@ -165,13 +171,18 @@ class CompiledDriver:
             InputError: numba cannot compile it, with the reason and the line.
         """
         if self._code is None:
-            self._code = _compile(self._function, self.wants)
+            self._code = _compile(self._function, self.wants, self._settings)
         address: int = self._code.address
         return address
 
+    def set(self, values: Mapping[str, float]) -> None:
+        """Set the tunable numbers, all of them; they hold from the next call on."""
+        for name, value in values.items():
+            self._settings[name] = value
+
 
 def compiled_driver(
-    *, memory: int = 0, wants: Iterable[str] = ()
+    *, memory: int = 0, wants: Iterable[str] = (), tunable: Mapping[str, Any] | None = None
 ) -> Callable[[Callable[..., tuple[float, float]]], CompiledDriver]:
     """Make a driver from a function ``(scene, ego, route, tracks, memory)``.
 
@@ -183,33 +194,38 @@ def compiled_driver(
             of each scenario, later as the function left it. No other state persists: numba
             treats globals as constants.
         wants: what else it gets, in the order of its further arguments, see `WANTED`.
+        tunable: numbers that may be set: names with (default, low, high) or (default, low, high,
+            unit). Its last argument then is a record of their values: ``settings.headway``.
 
     Raises:
-        InputError: not a whole number >= 0, or what is wanted is unknown.
+        InputError: not a whole number >= 0, what is wanted is unknown, or a tunable number has no
+            range.
     """
     if not isinstance(memory, int) or memory < 0:
         raise InputError(f"memory must be a whole number >= 0, got {memory!r}")
-    words = checked_wants(wants)
+    words, numbers = checked_wants(wants), checked_tunable(tunable)
     if "seed" in words:
         raise InputError("a compiled driver is given no seed: leave 'seed' out of wants")
-    return lambda function: CompiledDriver(function, memory, words)
+    return lambda function: CompiledDriver(function, memory, words, numbers)
 
 
-def _compile(function: Callable[..., Any], wants: Sequence[str]) -> Any:
+def _compile(function: Callable[..., Any], wants: Sequence[str], settings: Any) -> Any:
     """Return the C callback of a function; see `CompiledDriver.address`."""
     import numba
 
     if numba.config.DISABLE_JIT:
         raise InputError("a compiled driver must be compiled, which NUMBA_DISABLE_JIT forbids")
     further = [argument for word in wants for argument in WANTED[word]]
+    own = [settings.dtype] if settings.dtype.names else []
     names = ["scene", "ego", "route", "tracks", "memory", *(name for name, *_ in further)]
+    names += ["settings" for _ in own]
     if len(inspect.signature(function).parameters) != len(names):
         raise InputError(f"{_place(function)}: {function.__name__} must take {', '.join(names)}")
     # Indices are checked here, other than in our kernels: a write beyond an array would take the
     # driver's process down, where an error names the line.
     code = numba.njit(nogil=True, error_model="numpy", boundscheck=True)(function)
-    shapes = [(), (), *[(ANY,)] * 3, *(shape for *_, shape in further)]
-    types = [*ARGUMENT_TYPES, *(kind for _, kind, _ in further)]
+    shapes = [(), (), *[(ANY,)] * 3, *(shape for *_, shape in further), *(() for _ in own)]
+    types = [*ARGUMENT_TYPES, *(kind for _, kind, _ in further), *own]
     try:
         code.compile(tuple(map(_type_of, types, shapes)))
         returned = code.nopython_signatures[0].return_type
@@ -220,7 +236,7 @@ def _compile(function: Callable[..., Any], wants: Sequence[str]) -> Any:
                 f"{_place(function)}: {function.__name__} must return (acceleration, curvature), "
                 f"returns {returned}"
             )
-        return _callback(code, wants)
+        return _callback(code, wants, settings)
     except InputError:
         raise
     except Exception as error:  # numba's passes raise exceptions of any type
@@ -237,12 +253,12 @@ def _type_of(kind: np.dtype[Any], shape: tuple[int, ...]) -> Any:
     return numba.types.Array(found, len(shape), "C", aligned=not kind.names)
 
 
-def _callback(code: Any, wants: Sequence[str]) -> Any:
+def _callback(code: Any, wants: Sequence[str], settings: Any) -> Any:
     import numba
     from numba import carray
 
     scene_type, ego_type, route_type, track_type, number = ARGUMENT_TYPES
-    ask = _with_wanted(code, wants)
+    ask = _with_wanted(code, wants, settings)
 
     def call(  # type: ignore[no-untyped-def]
         scene, _1, ego, _2, route, n, tracks, m, memory, size, answer, _3, lanes, _4,
@@ -270,12 +286,13 @@ def _callback(code: Any, wants: Sequence[str]) -> Any:
 
 # One signature in C for all drivers, whatever they want: so the rollout that calls them is compiled
 # once, and kept on disk whatever the user writes. A call takes 21 ns.
-def _with_wanted(code: Any, wants: Sequence[str]) -> Any:
+def _with_wanted(code: Any, wants: Sequence[str], settings: Any) -> Any:
     """Return a function of all pointers and sizes, and of a tuple of the plain arguments.
 
     It calls the code with these and with what is wanted. (A function cannot return records.)
     """
     import numba
+    import numba.extending
     from numba import carray
 
     def call(then: Any, at: int, kind: Any, shape: tuple[int, ...]) -> Any:
@@ -295,10 +312,24 @@ def _with_wanted(code: Any, wants: Sequence[str]) -> Any:
 
         return (with_record, with_rows, with_table)[len(shape)]
 
+    @numba.extending.intrinsic
+    def pointer(_, address):  # type: ignore[no-untyped-def]
+        def generate(context, builder, signature, given):  # type: ignore[no-untyped-def]
+            return builder.inttoptr(given[0], context.get_value_type(numba.types.voidptr))
+
+        return numba.types.voidptr(address), generate
+
+    kept, place = settings.dtype, settings.ctypes.data
+
     @numba.njit
-    def found(pointers, sizes, given):  # type: ignore[no-untyped-def]
+    def set_last(pointers, sizes, given):  # type: ignore[no-untyped-def]
+        return code(*given, carray(pointer(place), (1,), kept)[0])
+
+    @numba.njit
+    def plain(pointers, sizes, given):  # type: ignore[no-untyped-def]
         return code(*given)
 
+    found = set_last if kept.names else plain
     names = [name for arguments in WANTED.values() for name, *_ in arguments]
     for name, kind, shape in reversed([pair for word in wants for pair in WANTED[word]]):
         found = call(found, names.index(name), kind, shape)

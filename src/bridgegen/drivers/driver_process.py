@@ -28,6 +28,7 @@ from bridgegen.drivers.drivers import TIME_LIMIT, is_spec
 from bridgegen.drivers.interface import BatchDriver, Control, Observation, Scene, Trajectory
 from bridgegen.drivers.remote.process import RemoteProcess
 from bridgegen.drivers.trajectory import Plans, checked_plans
+from bridgegen.drivers.tunable import Settings, checked_tunable, values_of
 from bridgegen.drivers.user_drivers import NAMES, Traits, traits_of
 from bridgegen.drivers.views import MapSender, Viewer, Views
 
@@ -54,8 +55,10 @@ class DriverProcess:
             a co-simulation unit, ``file.fmu``; or a driver in a process of the user's own, see
             `bridgegen.drivers.remote`.
         time_limit: seconds that a call may take.
+        settings: values of its tunable numbers.
 
     Attributes:
+        settings: likewise; new ones hold from the next call on.
         traits: what the driver says of itself. Known when the process has started.
         answers_each_row: whether it has answered several rows at once in the right shape.
         answers: what it has answered so far: "control", "trajectory" or both.
@@ -66,7 +69,7 @@ class DriverProcess:
     traits: Traits
     answers_each_row: bool = False
 
-    def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
+    def __init__(self, spec: str, time_limit: float = TIME_LIMIT, settings: Settings = ()) -> None:
         if not 0.0 < time_limit < float("inf"):
             raise InputError(f"a driver's time limit [s] must be > 0 and finite, got {time_limit}")
         if not is_spec(spec):
@@ -76,6 +79,8 @@ class DriverProcess:
             )
         self.spec = spec
         self.time_limit = time_limit
+        self.settings = settings
+        self._set: Settings = ()  # those that the process has
         self.answers: set[str] = set()
         self.asked_at = 0.0
         self.call_seconds: deque[float] = deque(maxlen=TIMED_CALLS)
@@ -91,13 +96,21 @@ class DriverProcess:
             )
 
     def start(self) -> None:
-        """Start the process, if it is not running, and construct the driver in it.
+        """Start the process, if it is not running, construct the driver in it, and set its numbers.
 
         Raises:
-            InputError: there is no such module or class, or it cannot be constructed.
+            InputError: there is no such module or class, it cannot be constructed, or has no such
+                settings.
         """
-        if self._process.runs:
-            return
+        if not self._process.runs:
+            self._begin()
+        if self.settings != self._set:
+            values = values_of(self.traits.tunable, self.settings, self.spec)
+            self._process.ask("set", values, seconds=self.time_limit)
+            self._set = self.settings
+
+    def _begin(self) -> None:
+        self._set = ()
         self._maps = MapSender()
         try:
             self.traits = self._process.start(START_SECONDS)
@@ -255,10 +268,10 @@ def answering(spec: str) -> tuple[Traits, Answer]:
     if isinstance(driver, CompiledDriver):
         address = driver.address
 
-        def call(_: str, function: Callable[..., Any], *arguments: Any) -> Any:
-            return function(address, *arguments)
+        def call(what: str, first: Any, *arguments: Any) -> Any:
+            return driver.set(first) if what == "set" else first(address, *arguments)
 
-        return Traits(memory=driver.memory, wants=driver.wants), call
+        return Traits(memory=driver.memory, wants=driver.wants, tunable=driver.tunable), call
 
     return answering_of(driver)
 
@@ -266,11 +279,18 @@ def answering(spec: str) -> tuple[Traits, Answer]:
 def answering_of(driver: BatchDriver) -> tuple[Traits, Answer]:
     """Return what a driver says of itself, and the function that answers requests to it."""
     traits = traits_of({name: getattr(driver, name, None) for name in NAMES})
+    owner: Any = driver
+    if tunable := checked_tunable(getattr(driver, "tunable", None)):
+        traits = replace(traits, tunable=tunable)
+        owner.settings = values_of(tunable, (), "")
     viewer = Viewer(traits.wants)
     period = 0.0
 
     def answer(what: str, *rest: Any) -> Any:
         nonlocal period
+        if what == "set":
+            owner.settings = dict(*rest)
+            return None
         if what == "reset":
             period = traits.steps(rest[1].time_step) * rest[1].time_step
             driver.reset(rest[0], viewer.reset(*rest))

@@ -20,6 +20,7 @@ from bridgegen.drivers.planners import (
     planners,
     require,
 )
+from bridgegen.drivers.tunable import Settings, read_settings, split_settings
 
 STAGES = ("perception", "prediction", "control")
 """The stages of a driver that can be idealised, in order of execution; planning is the rest."""
@@ -91,6 +92,7 @@ class Driver:
             empty: it does not say.
         called: what the user calls it (``--name``); empty: as its name says.
         stops_in_lane: whether it stops where its operational design domain is left.
+        settings: values of its tunable numbers that are not at their defaults.
     """
 
     name: str
@@ -104,6 +106,7 @@ class Driver:
     domain: frozenset[str] = frozenset()
     called: str = field(default="", compare=False)
     stops_in_lane: bool = False
+    settings: Settings = ()
 
     @property
     def kernel(self) -> str:
@@ -227,7 +230,8 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         name: of one that ships, of a planner, or a user's own: ``package.module:Class``,
             ``file.py:Class`` (or a compiled driver's function), ``file.fmu``; or where it runs,
             as ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``. It is loaded when it drives.
-            One that ships may end in `STOP_IN_LANE`.
+            One that ships may end in `STOP_IN_LANE`; a user's class or function and a planner in
+            ``@FILE.yaml``, see `bridgegen.drivers.tunable`.
         ideal: stages to idealise.
         time_limit: [s] that one call of a user's own driver may take.
 
@@ -237,6 +241,15 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
             not installed.
     """
     known = DRIVERS | GUESTS
+    plain, file = split_settings(name)
+    if file is not None:
+        driver = get(plain, ideal, time_limit)
+        if not driver.is_own:
+            raise InputError(
+                f"settings (@{file}) are for drivers of your own and planners; the numbers of "
+                f"'{plain}' are compiled in"
+            )
+        return replace(driver, name=name, settings=read_settings(file))
     if time_limit is not None and not (name not in known and 0.0 < time_limit < math.inf):
         raise InputError(
             "a time limit [s] is for a driver of your own, and must be > 0 and finite, got "
@@ -277,13 +290,15 @@ def is_planner(name: str) -> bool:
 
 def is_spec(name: str) -> bool:
     """Return whether a name is that of a user's own driver, which is code."""
-    if is_remote(name):
+    # A planner with settings is only what a person has typed, too: its name holds a file.
+    if is_remote(name) or split_settings(name)[1] is not None:
         return True
     return name.endswith(".fmu") or (own_code.is_own(name) and not is_planner(name))
 
 
 def file_of(name: str) -> Path | None:
     """Return the file that the name of a user's own driver holds; None if it holds none."""
+    name = split_settings(name)[0]
     if not is_spec(name) or is_remote(name):
         return None
     return Path(name) if name.endswith(".fmu") else own_code.file_of(name)

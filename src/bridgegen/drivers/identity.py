@@ -13,6 +13,7 @@ from pathlib import Path
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.address import Command, address_of, is_remote
 from bridgegen.drivers.drivers import file_of
+from bridgegen.drivers.tunable import split_settings
 
 MOST_LETTERS = 80
 """Maximum number of characters of the name that a user gives a driver."""
@@ -47,8 +48,10 @@ def identity_of(driver: str, digest: str, name: str = "") -> Identity:
     """
     if not digest:
         return Identity(name or driver, driver)
-    end = "" if is_remote(driver) or driver.endswith(".fmu") else driver.rpartition(":")[2]
-    return Identity(name or end or Path(driver).name, f"{digest}:{end}")
+    plain, settings = split_settings(driver)
+    end = "" if is_remote(plain) or plain.endswith(".fmu") else plain.rpartition(":")[2]
+    called = (end or Path(plain).name) + (f"@{settings.name}" if settings else "")
+    return Identity(name or called, f"{digest}:{end}")
 
 
 def labels_of(drivers: Sequence[Identity]) -> list[str]:
@@ -87,13 +90,18 @@ def digest_of(driver: str) -> str:
     """Return a digest of the files that make a driver: its own, and modules beside it.
 
     Modules count if they lie in the file's folder and are imported by name, by the file or by
-    another one of them. What a driver reads as it runs (weights, say) does not.
+    another one of them; and the file of its settings. What else a driver reads as it runs
+    (weights, say) does not.
 
     Empty where no file is known: a driver that ships, in a package, or of a server.
     """
     try:
         if is_remote(driver):
             return _digest_of_command(driver)
+        plain, settings = split_settings(driver)
+        if settings is not None:
+            both = digest_of(plain).encode() + settings.read_bytes()
+            return hashlib.sha256(both).hexdigest()
         path = file_of(driver)
         if path is None or not path.is_file():
             return ""

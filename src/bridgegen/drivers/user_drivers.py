@@ -11,6 +11,7 @@ from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.drivers import drivers
 from bridgegen.drivers.address import is_remote
 from bridgegen.drivers.interface import WANTS
+from bridgegen.drivers.tunable import Tunable
 
 # --- A driver's file named without its class: what it could be called ---
 
@@ -67,12 +68,14 @@ class Traits:
         period: [s] between two calls of it; None if it is called at every instant.
         max_rows: how many scenarios it can drive at once; None for any number.
         memory: how many numbers a compiled driver keeps; None for one that is called.
+        tunable: its numbers that may be set.
     """
 
     wants: tuple[str, ...] = ()
     period: float | None = None
     max_rows: int | None = None
     memory: int | None = None
+    tunable: tuple[Tunable, ...] = ()
 
     def steps(self, time_step: float) -> int:
         """Return how many time steps [s] there are from one call to the next: the nearest, >= 1."""

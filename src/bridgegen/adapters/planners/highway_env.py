@@ -28,9 +28,10 @@ github.com/Farama-Foundation/HighwayEnv; Treiber, Hennecke, Helbing, Phys. Rev. 
 Kesting, Treiber, Helbing, Transp. Res. Rec. 1999 (2007) 86.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
-from typing import Any
+from types import MappingProxyType
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -137,6 +138,18 @@ class HighwayEnvDriver:
     """
 
     wants = ("map",)
+    # Defaults are those of highway-env, which states no ranges: these are ours, and hold what
+    # Treiber (2000) and Kesting (2007) use.
+    tunable: ClassVar = {
+        "TIME_WANTED": (1.5, 0.8, 3.0, "s"),
+        "DISTANCE_WANTED": (10.0, 6.0, 20.0, "m"),
+        "COMFORT_ACC_MAX": (3.0, 0.5, 4.0, "m/s²"),
+        "COMFORT_ACC_MIN": (-5.0, -6.0, -1.0, "m/s²"),
+        "POLITENESS": (0.0, 0.0, 1.0),
+        "LANE_CHANGE_MIN_ACC_GAIN": (0.2, 0.1, 1.0, "m/s²"),
+        "LANE_CHANGE_MAX_BRAKING_IMPOSED": (2.0, 0.5, 4.0, "m/s²"),
+    }
+    settings: Mapping[str, float] = MappingProxyType({})
 
     def __init__(self) -> None:
         require(PLANNER)
@@ -156,7 +169,8 @@ class HighwayEnvDriver:
             seen = inputs.of(observation, i)
             row = self._rows[i]
             if row is None:
-                row = self._rows[i] = _Row(inputs.road, self._scene.time_step)
+                row = _Row(inputs.road, self._scene.time_step, self.settings)
+                self._rows[i] = row
             commands[i] = row.act(*seen)
         return Control(commands[:, 0], rear_curvature(commands[:, 1], self._scene.centre))
 
@@ -301,7 +315,7 @@ def _arc(points: Float) -> Float | None:
 class _Row:
     """The planner in one scenario: its road, its vehicles, and what it remembers."""
 
-    def __init__(self, arrays: Arrays, time_step: float) -> None:
+    def __init__(self, arrays: Arrays, time_step: float, settings: Mapping[str, float]) -> None:
         from highway_env.road.road import Road
         from highway_env.vehicle.objects import Obstacle
 
@@ -310,7 +324,7 @@ class _Row:
         for lane, ends in zip(self._lanes, arrays["lane_ends"], strict=True):
             if ends:
                 self._road.objects.append(Obstacle(self._road, lane.position(lane.length, 0)))
-        self._time_step = time_step
+        self._time_step, self._settings = time_step, settings
         self._ego: Any = None
         self._others: dict[int, Any] = {}
 
@@ -323,6 +337,7 @@ class _Row:
             lane.speed_limit, lane.forbidden = (float(limit) if np.isfinite(limit) else None), no
         if self._ego is None:
             self._ego = IDMVehicle(self._road, ego[:2], float(ego[2]), float(ego[3]))
+            vars(self._ego).update(self._settings)  # before those of its class
         there = []
         for j in np.flatnonzero(others[:, 0]).tolist():
             _, x, y, h, v = others[j].tolist()

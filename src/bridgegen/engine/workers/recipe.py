@@ -13,6 +13,7 @@ from typing import Any, Self
 
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import file_of
+from bridgegen.drivers.tunable import split_settings
 
 
 @dataclass(frozen=True)
@@ -75,10 +76,12 @@ class CarriedDriver:
     Attributes:
         name: the value of ``--ego``.
         data: the file's bytes; None if the driver has no file.
+        settings: the bytes of its file of settings; None if it has none.
     """
 
     name: str
     data: bytes | None
+    settings: bytes | None = None
 
     @classmethod
     def of(cls, name: str) -> Self:
@@ -87,30 +90,46 @@ class CarriedDriver:
         Raises:
             InputError: the file cannot be read.
         """
-        path = file_of(name)
+        path, settings = file_of(name), split_settings(name)[1]
         try:
             # The file's bytes, now: a search that takes days goes on with the driver that it began
             # with.
-            return cls(name, path.read_bytes() if path and path.is_file() else None)
+            return cls(
+                name,
+                path.read_bytes() if path and path.is_file() else None,
+                settings.read_bytes() if settings else None,
+            )
         except OSError as error:
-            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+            raise InputError(f"{error.filename}: cannot be read: {error.strerror}") from None
 
     def here(self) -> str:
         """Return its name here: unchanged if the same file exists, else that of a copy."""
-        path = file_of(self.name)
-        if path is None or self.data is None or _holds(path, self.data):
-            return self.name
-        # The file is imported as code, so its folder is this user's alone.
-        home = Path(tempfile.gettempdir()) / f"bridgegen-drivers-{os.getuid()}"
-        folder = home / hashlib.blake2b(self.data, digest_size=16).hexdigest()
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        copy = folder / path.name
-        if not _holds(copy, self.data):
-            # Workers of one machine write at the same time: each reads a whole file.
-            part = folder / f".{path.name}.{os.getpid()}"
-            part.write_bytes(self.data)
-            part.replace(copy)
-        return f"{copy}{self.name.removeprefix(str(path))}"
+        plain, settings = split_settings(self.name)
+        path, end = file_of(plain), ""
+        if settings is not None and self.settings is not None:
+            end = f"@{_copied(settings, self.settings)}"
+        if path is None or self.data is None:
+            return f"{plain}{end}"
+        if (copy := _copied(path, self.data)) != path:
+            plain = f"{copy}{plain.removeprefix(str(path))}"
+        return f"{plain}{end}"
+
+
+def _copied(path: Path, data: bytes) -> Path:
+    """Return the path of a file with these contents: itself if it has them, else a copy."""
+    if _holds(path, data):
+        return path
+    # The file may be imported as code, so its folder is this user's alone.
+    home = Path(tempfile.gettempdir()) / f"bridgegen-drivers-{os.getuid()}"
+    folder = home / hashlib.blake2b(data, digest_size=16).hexdigest()
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    copy = folder / path.name
+    if not _holds(copy, data):
+        # Workers of one machine write at the same time: each reads a whole file.
+        part = folder / f".{path.name}.{os.getpid()}"
+        part.write_bytes(data)
+        part.replace(copy)
+    return copy
 
 
 def _holds(path: Path, data: bytes) -> bool:

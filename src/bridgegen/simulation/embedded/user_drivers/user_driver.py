@@ -88,6 +88,7 @@ class OwnDriver:
         """
         if self.traits.memory is None:
             with self._turn:  # it is one, and has all rows at once
+                self._first.process.settings = program.driver.settings
                 return drive_in_lock_step(
                     program, setup, n, self._first.process, self._is_stopped.is_set
                 )
@@ -98,6 +99,7 @@ class OwnDriver:
                 self._idle.append(self._seat())
                 self._seats.append(self._idle[0])
             seat = self._idle.pop()
+        seat.process.settings = program.driver.settings
         try:
             return _drive(setup, n, seat, self._is_stopped.is_set)
         finally:
@@ -140,6 +142,7 @@ class OwnDriver:
             return keep
 
         with self._turn:
+            self._first.process.settings = program.driver.settings
             drive_in_lock_step(
                 program, setup, n, self._first.process, self._is_stopped.is_set, note
             )
@@ -152,6 +155,7 @@ class OwnDriver:
             InputError: the driver cannot be made.
             DriverError: it failed as it began, or when it is asked.
         """
+        self._first.process.settings = program.driver.settings
         if self.traits.memory is None:
             return Wheel(program, batch, self._first.process).demand
         return partial(_ask, self._first.process, batch)
@@ -164,7 +168,8 @@ class OwnDriver:
                 seat.process.kill()
 
     def _seat(self) -> "Seat":
-        return Seat(DriverProcess(self._driver.spec, self._driver.time_limit))
+        driver = self._driver
+        return Seat(DriverProcess(driver.spec, driver.time_limit, driver.settings))
 
 
 class Seat:

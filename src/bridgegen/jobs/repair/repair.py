@@ -1,0 +1,428 @@
+"""Repairs a driver: search, set its numbers, search again; then both on held-out variations."""
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.base.arrays import Float
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import InputError, Interrupted
+from bridgegen.base.statistics import clopper_pearson
+from bridgegen.base.units import percent
+from bridgegen.drivers import drivers
+from bridgegen.drivers.identity import digest_of
+from bridgegen.drivers.tunable import split_settings, values_of
+from bridgegen.engine.options import SearchOptions, called_with
+from bridgegen.jobs.frame import Judged, Table, command_of
+from bridgegen.jobs.repair.options import JOB, RepairOptions
+from bridgegen.jobs.repair.tune import FAILS, PASSES, Bench, Rows
+from bridgegen.jobs.search import Run, resume, run_search
+from bridgegen.jobs.search.campaign import SearchCallbacks
+from bridgegen.jobs.suite.difference import ALGORITHM, DriverDifference, compare_drivers
+from bridgegen.jobs.suite.entries import find_entries
+from bridgegen.jobs.suite.evaluate import Job, pipeline_of
+from bridgegen.jobs.suite.options import ScenariosOptions
+from bridgegen.jobs.suite.rows import is_sample
+from bridgegen.jobs.suite.suite import check, default_folder
+from bridgegen.pages.templates import Banner, write_page
+from bridgegen.results.folder import claim
+from bridgegen.results.store.run_file import FILE
+from bridgegen.search.triage.record import NOT_JUDGED
+from bridgegen.simulation.choice import EMBEDDED
+
+SETTINGS, ROUNDS, PATCH, RESULT, PAGE = (
+    "settings.json", "rounds", "patch.yaml", "repair.json", "repair.html",
+)  # fmt: skip
+DIFF = "diff"
+
+GUARDS, MOST_FAILING, MOST_LEFT = 64, 64, 200
+"""Random variations of a scenario of which those that pass must still pass, and as many that the
+first search has passed; failures that a search adds at most; those left that are listed at most."""
+
+_STREAM = 53  # of random numbers, apart from others of the same seed
+
+WHYS = {
+    "new": "new: it passes without the settings",
+    "late": "found by the last search: no settings were sought for it",
+    "structure": "the structure, not the numbers: none of the settings that were tried mends it",
+    "traded": "other settings mend it, but break a constraint or mend fewer",
+}
+"""Why a failure is left, by figure."""
+
+
+@dataclass(frozen=True)
+class Repair:
+    """What a repair has come to.
+
+    Attributes:
+        record: as JSON's types: driver, settings, figures, modes, what is left, rounds.
+        held_out: both drivers on variations that it has not seen; None where no settings are
+            better.
+        evaluations: of the searches.
+        tried: number of settings.
+        command: repeats it.
+        folder: of its files.
+    """
+
+    record: dict[str, Any]
+    held_out: DriverDifference | None
+    evaluations: int
+    tried: int
+    command: str
+    folder: Path
+
+    @property
+    def repaired(self) -> str:
+        """The driver with its settings, as ``--ego`` takes it; "" where none are better."""
+        return str(self.record["repaired"] or "")
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """The figures of `JOB`; NaN: of held-out variations that were not compared."""
+        known = self.record["figures"]
+        return {name: float("nan") if known[name] is None else known[name] for name in JOB.figures}
+
+    @property
+    def work(self) -> str:
+        """How much was done."""
+        held_out = f", {self.held_out.work}" if self.held_out else ""
+        return f"{self.evaluations:,} evaluations, {self.tried:,} settings{held_out}"
+
+    @property
+    def sentence(self) -> str:
+        """The result in words."""
+        of = self.record["figures"]
+        if not self.repaired:
+            return (
+                f"No settings mend more of {of['failures']:,} failures, keep what passes, and jerk "
+                f"and travel time within 5 %; {of['structure']:,} are the structure, not the "
+                f"numbers: none of {self.tried:,} settings mends them."
+            )
+        text = f"The settings mend {of['mended']:,} of {of['failures']:,} failures"
+        if of["new"]:
+            text += f", and {of['new']:,} of the others are new"
+        text += f". Held out: they fix {of['fixed']:,}, break {of['broken']:,}"
+        if of["fails_upper"] is None:
+            return f"{text}."
+        return f"{text}; with 95 % confidence at most {percent(of['fails_upper'])} still fail."
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        """The numbers, and why failures are left."""
+        settings, of = self.record["settings"], self.record["figures"]
+        numbers = [
+            (name, *(f"{one[key]:g} {one['unit']}" for key in ("old", "new")))
+            for name, one in settings.items()
+        ]
+        left = [(why, of[name]) for name, why in WHYS.items() if of[name]]
+        return {
+            "numbers": Table(("number", "old", "new"), numbers),
+            "left": Table(("left", "failures"), left, 1),
+        }
+
+    def to_json(self) -> Any:
+        """Return the settings, figures, modes, and what is left, as JSON's types."""
+        return self.record | {"held_out": self.held_out.to_json() if self.held_out else None}
+
+    def shown(self) -> Sequence[str | Table]:
+        """Return the sentence, the numbers, what is left, comfort, and the files."""
+        of, tables = self.record["figures"], self.tables
+        return [
+            self.sentence,
+            "",
+            *tables.values(),
+            "",
+            f"  {'robust modes':<16}{of['modes_gone']} of {of['modes']} gone",
+            f"  {'mean jerk':<16}{of['jerk'] - 1.0:+.1%}",
+            f"  {'travel time':<16}{of['travel_time'] - 1.0:+.1%}",
+            *([f"\n{'driver':<12}{self.repaired}"] if self.repaired else []),
+            *([f"{'diff':<12}{self.held_out.page}"] if self.held_out else []),
+            f"{'page':<12}{self.folder / PAGE}",
+        ]
+
+    def judged(self) -> list[Judged]:
+        """Return the figures, believed where settings were found."""
+        ego, page = str(self.record["driver"]), str(self.folder / PAGE)
+        facts = {"ego": ego, "command": self.command, "page": page}
+        made = (f"{ego} repair", "bridgegen.repair", "settings were found", bool(self.repaired))
+        return [Judged(*made, self.sentence, self.figures, facts)]
+
+    def write(self) -> None:
+        """Write the record and the page.
+
+        Raises:
+            StorageError: they cannot be written.
+        """
+        of, found = self.record["figures"], self.held_out.difference if self.held_out else None
+        kind = "open" if found is None else "fails" if of["broken"] or of["new"] else ""
+        rates = []
+        if found is not None:
+            for change, count in found.counts.items():
+                rates.append((change, count, " to ".join(map(percent, found.interval(change)))))
+        write_whole(self.folder / RESULT, [json.dumps(self.to_json(), indent=1).encode()])
+        write_page(
+            self.folder / PAGE,
+            "jobs/repair/page.html",
+            title=f"Repair of {self.record['driver']}",
+            facts=[self.work, f"mean jerk {of['jerk'] - 1.0:+.1%}",
+                   f"travel time {of['travel_time'] - 1.0:+.1%}"],
+            verdict=Banner(self.sentence, kind),
+            rates=rates,
+            diff=f"{DIFF}/{self.held_out.page.name}" if self.held_out else "",
+            repair=self,
+            tables=self.tables,
+        )  # fmt: skip
+
+
+@called_with(RepairOptions)
+def repair_driver(given: RepairOptions) -> Repair:
+    """Set a driver's tunable numbers so that failures are gone, with the least change.
+
+    Called again with the same arguments after it was stopped, it resumes: searches are kept.
+
+    Returns:
+        The settings, what they mend, and what they do not; its files are written.
+
+    Raises:
+        InputError: the driver has no tunable numbers, no failure is found, or an argument breaks a
+            rule.
+        StorageError: the folder holds something else, or cannot be written.
+        Interrupted: Ctrl-C; what is done is kept.
+    """
+    check(given, EMBEDDED)
+    if len(given.egos) != 1:
+        raise InputError(f"one driver is repaired (--ego), got {', '.join(given.egos) or 'none'}")
+    ego = given.egos[0]
+    if not drivers.get(ego).is_own:
+        raise InputError(
+            f"'{ego}' has no tunable numbers: those of drivers that ship are compiled in; repair a "
+            "driver of your own or a planner"
+        )
+    files = [given.files] if isinstance(given.files, str | Path) else list(given.files)
+    jobs = [
+        Job(entry, ego, given.of_each, EMBEDDED, given.samples, given.seed, given.matrix)
+        for entry in find_entries(files)
+    ]
+    if problems := [job.entry.problem for job in jobs if job.entry.problem]:
+        raise InputError(*problems)
+    folder = Path(given.out or Path("repairs") / default_folder(files).name)
+    made = _Repairer(given, ego, jobs, folder)
+    free = ("workers", "out", "callbacks", "files")
+    settings = {
+        **{name: repr(value) for name, value in vars(given).items() if name not in free},
+        "version": version("bridgegen"),
+        "files of drivers": digest_of(ego),
+        "scenario files": {job.entry.name: job.entry.digest for job in jobs},
+    }
+    ours = (PATCH, RESULT, PAGE, DIFF)
+    claim(folder, settings, file=SETTINGS, what="repair", pieces=ROUNDS, belongs=ours.__contains__)
+    try:
+        found = made.run()
+    except (KeyboardInterrupt, Interrupted):
+        raise Interrupted(
+            folder, made.round, given.rounds, what="rounds", command=made.command
+        ) from None
+    found.write()
+    return found
+
+
+class _Repairer:
+    """Does the rounds of a repair.
+
+    Raises:
+        InputError: the driver declares no tunable numbers, or nothing varies in a scenario.
+    """
+
+    def __init__(self, given: RepairOptions, ego: str, jobs: Sequence[Job], folder: Path) -> None:
+        self.given, self.ego, self.jobs, self.folder = given, ego, jobs, folder
+        self.command, self.round = command_of(JOB.name, given, folder), 0
+        given.callbacks.compile()
+        pipelines = [pipeline_of(job) for job in jobs]
+        for job, pipeline in zip(jobs, pipelines, strict=True):
+            if not (pipeline.space.n_var and is_sample(pipeline.scenario)):
+                raise InputError(f"{job.entry.name}: nothing varies in it that could be searched")
+        runner = pipelines[0].runner
+        self.tunable = runner.embedded.own_driver.traits.tunable
+        if not self.tunable:
+            raise InputError(
+                f"the driver '{ego}' declares no tunable numbers; its class must have, for "
+                'example, tunable = {"headway": (1.5, 0.5, 3.0, "s")}: default, low, high, unit'
+            )
+        self.old = tuple(values_of(self.tunable, runner.driver.settings, ego).values())
+        self.bench = Bench(pipelines, self.tunable, self.old)
+
+    def run(self) -> Repair:
+        """Search and tune until nothing new is found; then compare on held-out variations."""
+        given, bench, values, sought = self.given, self.bench, self.old, 0
+        rounds = list[tuple[int, int]]()
+        for number in range(given.rounds + 1):
+            self.round = number
+            runs = [self._search(job, number) for job in self.jobs]
+            fresh = self._failures(runs, values)
+            if number == 0:
+                first, fresh = runs, fresh + self._guard(runs)
+            rounds.append((sum(run.summary.evaluations for run in runs), len(fresh.X)))
+            if number == 0 and not len(fresh.X):
+                names = ", ".join(job.entry.name for job in self.jobs)
+                found = [run.triage.bound for run in runs if run.triage]
+                whys = [bound.sentence for bound in found if bound.verdict == NOT_JUDGED]
+                raise InputError(
+                    f"no failure of '{self.ego}' was found in {rounds[0][0]:,} evaluations of "
+                    f"{names}; " + ("; ".join(whys) or "try a larger --budget")
+                )
+            bench.add(fresh)
+            if not len(fresh.X) or number == given.rounds:
+                break
+            sought = len(bench.failing.X)
+            given.callbacks.stage(f"settings, round {number + 1}")
+            best = bench.tune(values, given.tries, [given.seed, _STREAM, number])
+            # Every search finds the failures again that no numbers mend: these are no reason to go
+            # on.
+            if best.mends.sum() <= bench.trial(values).mends.sum():
+                break
+            values = best.values
+            self._write(self._patch(number + 1), values)
+        return self._result(values, rounds, first, sought)
+
+    def _search(self, job: Job, number: int) -> Run:
+        """Search a scenario with a round's settings; read or resume what an earlier call began."""
+        given = self.given
+        ego = self._named(self._patch(number)) if number else self.ego
+        options = SearchOptions.of(
+            job.options,
+            ego=ego,
+            distribution=job.entry.distribution,
+            algorithm=ALGORITHM,
+            budget=given.budget,
+            seed=given.seed + number,
+            causes=False,
+            triage="none" if number else "short",
+        )
+        facts = f"round {number}: {job.entry.name}"
+        show = partial(given.callbacks.progress, "searching")
+        how = SearchCallbacks(batch=lambda at: show(at.evaluations, given.budget, facts))
+        name = re.sub(r"[^\w.-]+", "-", job.entry.name)
+        folder = self.folder / ROUNDS / str(number) / name
+        if not (folder / FILE).exists():
+            return run_search(job.entry.scenario, **vars(options), out=folder, callbacks=how)
+        run = Run(folder)
+        return run if run.report.exists() else resume(folder, ego=ego, callbacks=how)
+
+    def _failures(self, runs: Sequence[Run], values: tuple[float, ...]) -> Rows:
+        """Return failing rows of searches: examples of all modes, then others at random."""
+        parts, random = [], np.random.Generator(np.random.PCG64([self.given.seed, _STREAM]))
+        for run in runs:
+            rows, modes = run.rows(), run.triage.modes if run.triage else ()
+            others = random.permutation(np.flatnonzero(rows.critical)).tolist()
+            wanted = [*(i for mode in modes for i in mode.examples[:3]), *others]
+            parts.append(rows.X[[*dict.fromkeys(wanted)][:MOST_FAILING]])
+        found = Rows.of(parts)
+        at = np.flatnonzero(self.bench.drive(found, values)[:, FAILS])
+        return Rows(tuple(found.X[i] for i in at), found.scene[at])
+
+    def _guard(self, runs: Sequence[Run]) -> Rows:
+        """Choose the rows that must still pass; return random ones that fail."""
+        drawn, passed = list[Float](), list[Float]()
+        for scene, (run, pipeline) in enumerate(zip(runs, self.bench.pipelines, strict=True)):
+            random = np.random.Generator(np.random.PCG64([self.given.seed, _STREAM, scene]))
+            space, rows = pipeline.space, run.rows()
+            drawn.append(space.decode(random.random((GUARDS, space.n_var))) + 0.0)
+            at = random.permutation(np.flatnonzero(~rows.critical & (rows.status == 0)))
+            passed.append(rows.X[np.sort(at[:GUARDS])])
+        return self.bench.guard(Rows.of(drawn), Rows.of(passed))
+
+    def _patch(self, number: int) -> Path:
+        return self.folder / ROUNDS / str(number) / PATCH
+
+    def _named(self, patch: Path) -> str:
+        return f"{split_settings(self.ego)[0]}@{patch}"
+
+    def _write(self, path: Path, values: tuple[float, ...]) -> None:
+        """Write settings as the driver reads them."""
+        lines = [f"# By bridgegen repair; to drive with it: --ego {self._named(path)}"]
+        for item, old, new in zip(self.tunable, self.old, values, strict=True):
+            unit = f", unit: {json.dumps(item.unit, ensure_ascii=False)}" if item.unit else ""
+            # What an earlier file sets, and this one does not change, is said again.
+            if not old == new == item.default:
+                lines.append(f"{item.name}: {{old: {old!r}, new: {new!r}{unit}}}")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, ["\n".join([*lines, ""]).encode()])
+
+    def _result(
+        self,
+        values: tuple[float, ...],
+        rounds: Sequence[tuple[int, int]],
+        first: Sequence[Run],
+        sought: int,
+    ) -> Repair:
+        given, bench = self.given, self.bench
+        old, new = bench.trial(self.old), bench.trial(values)
+        repaired, held_out, upper, counts = "", None, None, dict[str, int]()
+        if values != self.old:
+            self._write(self.folder / PATCH, values)
+            repaired = self._named(self.folder / PATCH)
+            shared = {item.name: getattr(given, item.name) for item in fields(ScenariosOptions)}
+            shared |= {"egos": (self.ego, repaired), "out": self.folder / DIFF}
+            held_out = compare_drivers(**shared, budget=0)
+            counts = {**held_out.difference.counts}  # type: ignore[dict-item]
+            compared = sum(counts.values()) - counts["not comparable"]
+            if compared:
+                upper = clopper_pearson(counts["broken"] + counts["both fail"], compared)[1]
+        left = ~new.mends
+        late = left & (np.arange(len(left)) >= sought)
+        whys = {"new": left & old.mends, "late": late & ~old.mends}
+        whys["structure"] = left & bench.never & ~late
+        whys["traded"] = left & ~np.any([*whys.values()], axis=0)
+        modes = [mode for i, run in enumerate(first) for mode in self._modes(i, run, values)]
+        robust = [mode for mode in modes if mode["robust"]]
+        figures = {
+            "changed": sum(a != b for a, b in zip(self.old, values, strict=True)),
+            "failures": len(left),
+            "mended": int(new.mends.sum()),
+            **{name: int(rows.sum()) for name, rows in whys.items()},
+            "modes": len(robust),
+            "modes_gone": sum(not mode["left"] for mode in robust),
+            **{k.replace(" ", "_"): counts.get(k) for k in ("broken", "fixed", "both fail")},
+            "fails_upper": upper,
+            "jerk": new.jerk,
+            "travel_time": new.travel_time,
+        }
+        rows = []
+        for i in np.flatnonzero(left)[:MOST_LEFT].tolist():
+            scene, why = int(bench.failing.scene[i]), next(k for k in WHYS if whys[k][i])
+            named = zip(
+                bench.pipelines[scene].space.names, bench.failing.X[i].tolist(), strict=True
+            )
+            name = self.jobs[scene].entry.name
+            rows.append({"scenario": name, "why": WHYS[why], "values": dict(named)})
+        each = zip(self.tunable, self.old, values, strict=True)
+        record = {
+            "driver": self.ego,
+            "repaired": repaired or None,
+            "settings": {t.name: {"old": a, "new": b, "unit": t.unit} for t, a, b in each},
+            "figures": figures,
+            "modes": modes,
+            "left": rows,
+            "rounds": [{"evaluations": n, "failures": found} for n, found in rounds],
+        }
+        evaluations = sum(n for n, _ in rounds)
+        return Repair(record, held_out, evaluations, bench.tried, self.command, self.folder)
+
+    def _modes(self, scene: int, run: Run, values: tuple[float, ...]) -> list[dict[str, Any]]:
+        """Return the failure modes of a search, and how many of their examples do not pass now."""
+        found, X = [], run.rows().X
+        for mode in run.triage.modes if run.triage else ():
+            examples = [*mode.examples]
+            rows = Rows(tuple(X[examples]), np.full(len(examples), scene))
+            left = int((self.bench.drive(rows, values)[:, PASSES] == 0.0).sum())
+            name, is_robust = self.jobs[scene].entry.name, not mode.knife_edge
+            of = {"scenario": name, "title": mode.title, "robust": is_robust}
+            found.append(of | {"examples": len(examples), "left": left})
+        return found
