@@ -7,6 +7,7 @@ All of it comes from the map. The ways are all lane chains that lead on from whe
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -25,11 +26,13 @@ from bridgegen.drivers.right_of_way import (
     right_of_way,
 )
 from bridgegen.openx.opendrive.geometry import reference_line
+from bridgegen.openx.opendrive.lane_changes import changes, marking
 from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
 from bridgegen.openx.opendrive.legs import governs, signals_on
 from bridgegen.openx.opendrive.model import SPEED_UNITS, OpenDrive, Road
 from bridgegen.openx.opendrive.outline import outline_of
 from bridgegen.openx.opendrive.routes import Place, Route, Step, Stretch, next_stretches, plan_route
+from bridgegen.scenario.weather import ROAD_TYPES
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -59,6 +62,7 @@ class Scene(NamedTuple):
 
     Attributes:
         road: ``(P, L, 3)``, see `road_along`.
+        classes: ``(P, M, 5)``, see `classes_along`.
         stops: ``(P, S)`` [m], the stations of the stop lines of S lights on the ego's route.
         halts: ``(P, H)`` [m], the stations of the lines of stop signs on it.
         crosswalks: ``(P, C, 4)``, see `crosswalks`.
@@ -75,6 +79,7 @@ class Scene(NamedTuple):
     """
 
     road: Float
+    classes: Float
     stops: Float
     halts: Float
     crosswalks: Float
@@ -162,6 +167,7 @@ def survey(
         ways[i, : len(table)] = table
     return Scene(
         road[None],
+        classes_along(model, route)[None],
         stops[None],
         np.array([[] if route is None else stop_signs(model, route)], dtype=np.float64),
         crosswalks(model, path, step)[None],
@@ -191,6 +197,7 @@ def stacked(scenes: Sequence[Scene]) -> Scene:
     """Return the scenes of several road networks as one; what is missing is padded."""
     return Scene(
         _padded([scene.road for scene in scenes], np.inf),
+        _padded([scene.classes for scene in scenes], np.inf),
         _padded([scene.stops for scene in scenes], np.inf),
         _padded([scene.halts for scene in scenes], np.inf),
         _padded([scene.crosswalks for scene in scenes], np.inf),
@@ -254,6 +261,50 @@ def road_along(model: OpenDrive, route: Route, step: float, count: int) -> Float
         if not road.is_connecting:
             found[at, 1], found[at, 2] = _beside(road, number, lane_id, s)
     return found
+
+
+def classes_along(model: OpenDrive, route: Route | None) -> Float:
+    """Return the class of the road, its markings and its shoulder, from where on they are so.
+
+    Returns:
+        ``(M, 5)``: the station on the route [m], ascending; the road's class as a row of
+        `ROAD_TYPES`, NaN of others; 1 where a border of the route's lane is marked, else 0; how
+        far left [m] the middle of the shoulder to its right is, negative; and how wide that is
+        [m], 0 where there is none. One row of NaN off the lanes.
+    """
+    found: list[tuple[float, ...]] = []
+    for piece in route.pieces if route is not None else ():
+        road = model.road(piece.road_id)
+        number = section_index(road, 0.5 * (piece.s + piece.s_end))
+        lane_id = lane_of(route.steps, piece.road_id, piece.s, piece.s_end) if route else 0
+        section, way = road.sections[number], road.direction(lane_id)
+        cuts = [kind.s for kind in road.types] + [section.s + s for s in changes(section)]
+        low, high = sorted((piece.s, piece.s_end))
+        ends = sorted({low, high, *(s for s in cuts if low < s < high)}, reverse=low != piece.s)
+        for a, b in pairwise(ends):
+            middle = 0.5 * (a + b)
+            kinds = [kind.type for kind in road.types if kind.s <= middle]
+            marks = [marking(section, at, middle - section.s) for at in (lane_id, inner(lane_id))]
+            row = (
+                ROAD_TYPES.index(kinds[-1]) if kinds and kinds[-1] in ROAD_TYPES else math.nan,
+                any(mark is not None and mark.type != "none" for mark in marks),
+                *_shoulder(road, number, lane_id, np.array([a, middle, b]), way),
+            )
+            station = piece.station + (a - piece.s) / piece.rate
+            if not found or not np.array_equal(found[-1][1:], row, equal_nan=True):
+                found.append((station, *row))
+    return np.array(found or [(0.0, *[math.nan] * 4)], dtype=np.float64)
+
+
+def _shoulder(road: Road, number: int, lane_id: int, s: Float, way: int) -> tuple[float, float]:
+    """Return how far left the middle of the shoulder right of a lane is, and how wide it is [m]."""
+    other = lane_id + (1 if lane_id > 0 else -1)
+    lane = road.sections[number].lane(other)
+    if lane is None or lane.type not in ("shoulder", "stop") or (lane_id < 0) != (way > 0):
+        return 0.0, 0.0
+    t = borders(road, number, s)
+    aside = 0.5 * (np.abs(t[other] - t[lane_id]) + np.abs(t[lane_id] - t[inner(lane_id)]))
+    return -float(aside.min()), float(np.abs(t[other] - t[lane_id]).min())
 
 
 def stop_lines(model: OpenDrive, route: Route, lights: Sequence[str]) -> list[StopLine]:

@@ -152,6 +152,21 @@ class Segment:
 
 
 @dataclass(frozen=True)
+class Change:
+    """What of a road is different from a place on.
+
+    Attributes:
+        at: the place, from the road's start [m].
+        road_type: its class from there on; "": as before.
+        markings: how its lanes are marked from there on; "": as before.
+    """
+
+    at: Quantity
+    road_type: RoadType | Literal[""] = ""
+    markings: Literal["none", ""] = ""
+
+
+@dataclass(frozen=True)
 class RoadsSpec:
     """A road network as a scenario file describes it.
 
@@ -165,6 +180,7 @@ class RoadsSpec:
         road_type: what kind of road it is.
         left_hand: whether traffic drives on the left: then this is its mirror image.
         country: by whose law priority is judged, a code of ISO 3166-1; "": none is stated.
+        change: of a road: what is different from a place on; None: nothing.
     """
 
     template: Template
@@ -176,10 +192,12 @@ class RoadsSpec:
     road_type: RoadType = "town"
     left_hand: bool = False
     country: str = ""
+    change: Change | None = None
 
     def __repr__(self) -> str:
         """Return its contents in canonical form, for a scenario's fingerprint."""
         more = f", {self.left_hand!r}, {self.country!r}" if self.left_hand or self.country else ""
+        more += f", {self.change!r}" if self.change else ""
         return (
             f"RoadsSpec({self.template!r}, {dict(sorted(self.knobs.items()))!r}, "
             f"{dict(sorted(self.legs.items()))!r}, {self.segments!r}, {self.crosswalk_at!r}, "
@@ -199,7 +217,8 @@ class RoadsSpec:
             for segment in self.segments
             for q in (segment.length, segment.curvature, segment.end_curvature)
         ]
-        return frozenset(q for q in (*self.knobs.values(), *bends) if isinstance(q, str))
+        places = () if self.change is None else (self.change.at,)
+        return frozenset(q for q in (*self.knobs.values(), *bends, *places) if isinstance(q, str))
 
     @property
     def closes(self) -> dict[str, Quantity]:

@@ -88,6 +88,12 @@ def _add_road(builder: Builder, leg: Leg, index: int, road: ArmRoad) -> ox.Named
         put(node, "has_road_type", road.road_type)
     if road.grade != 0.0 or isinstance(road.grade, Searched):
         quantity(node, "has_grade", road.grade)
+    if road.change is not None:
+        at, kind, marking = road.change
+        quantity(node, "has_change_at", at)
+        for name, later in (("has_later_road_type", kind), ("has_later_marking_type", marking)):
+            if later:
+                put(node, name, later)
     for name, limit in road.closes.items():
         quantity(node, f"closes_above_{name}", limit)
     for number, segment in enumerate(road.segments, start=1):
