@@ -37,6 +37,7 @@ STATION, ROAD_TYPE, LANE_MARKING, ASIDE, WIDTH = range(5)
 ON_SHOULDER = 2
 """Value of ``Plan.stops_in_lane``: it stops on the shoulder, where there is one."""
 
+GENTLE = 0.5  # m/s², it brakes no less on its way to the shoulder, which it may not reach; ours
 CENTRED = 0.5  # m beside its route up to which it can leave its lane for the shoulder; ours
 
 
@@ -86,11 +87,9 @@ def heed_domain(k, demanded, plan, roads, state, record):
         road_type = lane_marking = math.nan
         if leads_on(roads.changes, state.on[0]):
             front = state.station[0] + plan.bodies[0, 2] + 0.5 * plan.bodies[0, 0]
-            row = class_at(roads.classes, front)
-            road_type, lane_marking = (
-                roads.classes[row, ROAD_TYPE],
-                roads.classes[row, LANE_MARKING],
-            )
+            here = class_at(roads.classes, front)
+            road_type = roads.classes[here, ROAD_TYPE]
+            lane_marking = roads.classes[here, LANE_MARKING]
         if is_outside(state.weather, road_type, lane_marking, plan.limits):
             state.transitions[EXIT] = k + 1
     if plan.stops_in_lane == 0 or state.transitions[EXIT] == 0:
@@ -109,7 +108,7 @@ def heed_domain(k, demanded, plan, roads, state, record):
     # It stands no sooner than where it is on the shoulder.
     rest = state.shoulder[BEGINS] + state.shoulder[LENGTH] - s
     if rest > 0.0:
-        braking = min(braking, v * v / (2.0 * rest))
+        braking = min(braking, max(v * v / (2.0 * rest), GENTLE))
     return min(demanded, -braking)
 
 
