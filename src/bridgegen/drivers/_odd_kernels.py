@@ -34,9 +34,7 @@ lies, and its group's number."""
 STATION, ROAD_TYPE, LANE_MARKING, ASIDE, WIDTH = range(5)
 """Columns of ``Roads.classes``, see `bridgegen.drivers.scene.classes_along`."""
 
-ON_SHOULDER = 2
-"""Value of ``Plan.stops_in_lane``: it stops on the shoulder, where there is one."""
-
+ON_SHOULDER = 2  # value of ``Plan.stops_in_lane``: it stops on the shoulder, where there is one
 GENTLE = 0.5  # m/s², it brakes no less on its way to the shoulder, which it may not reach; ours
 CENTRED = 0.5  # m beside its route up to which it can leave its lane for the shoulder; ours
 
@@ -61,9 +59,8 @@ def is_outside(weather, road_type, lane_marking, limits):
         value = road_type if column == WEATHER else lane_marking
         if column < WEATHER:
             value = weather[column]
-        elif math.isnan(value):
-            kept = True
-        kept = kept or (limits[i, LOW] <= value and value <= limits[i, HIGH])
+        is_unknown = column >= WEATHER and math.isnan(value)
+        kept = kept or is_unknown or (limits[i, LOW] <= value and value <= limits[i, HIGH])
     return not kept
 
 

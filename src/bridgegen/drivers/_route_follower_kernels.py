@@ -33,19 +33,13 @@ def hold_speed(v, target):
 def keep_to_route(k, roads, state, record):
     """Return the curvature [1/m] that keeps the ego to its route, or its shoulder, at instant k."""
     p = state.on[0]
-    if state.shoulder[LENGTH] > 0.0:
-        shoulder = state.shoulder
+    to = state.shoulder
+    if to[LENGTH] > 0.0:
         return pursue_beside(
-            roads.paths[p],
-            roads.counts[p],
-            roads.steps[p],
-            state.station[0],
-            (shoulder[0], shoulder[1], shoulder[2], shoulder[3]),
-            record.x[0, k],
-            record.y[0, k],
-            record.h[0, k],
+            roads.paths[p], roads.counts[p], roads.steps[p], state.station[0],
+            (to[0], to[1], to[2], to[3]), record.x[0, k], record.y[0, k], record.h[0, k],
             preview(record.v[0, k]),
-        )
+        )  # fmt: skip
     return steer(
         roads.paths[p],
         roads.counts[p],

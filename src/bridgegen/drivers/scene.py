@@ -277,34 +277,34 @@ def classes_along(model: OpenDrive, route: Route | None) -> Float:
         road = model.road(piece.road_id)
         number = section_index(road, 0.5 * (piece.s + piece.s_end))
         lane_id = lane_of(route.steps, piece.road_id, piece.s, piece.s_end) if route else 0
-        section, way = road.sections[number], road.direction(lane_id)
+        section = road.sections[number]
         cuts = [kind.s for kind in road.types] + [section.s + s for s in changes(section)]
         low, high = sorted((piece.s, piece.s_end))
         ends = sorted({low, high, *(s for s in cuts if low < s < high)}, reverse=low != piece.s)
         for a, b in pairwise(ends):
-            middle = 0.5 * (a + b)
-            kinds = [kind.type for kind in road.types if kind.s <= middle]
-            marks = [marking(section, at, middle - section.s) for at in (lane_id, inner(lane_id))]
+            s = np.array([a, 0.5 * (a + b), b])
+            kind = next((kind.type for kind in reversed(road.types) if kind.s <= s[1]), "")
+            marks = [marking(section, at, s[1] - section.s) for at in (lane_id, inner(lane_id))]
             row = (
-                ROAD_TYPES.index(kinds[-1]) if kinds and kinds[-1] in ROAD_TYPES else math.nan,
+                ROAD_TYPES.index(kind) if kind in ROAD_TYPES else math.nan,
                 any(mark is not None and mark.type != "none" for mark in marks),
-                *_shoulder(road, number, lane_id, np.array([a, middle, b]), way),
+                *_shoulder(road, number, lane_id, s),
             )
-            station = piece.station + (a - piece.s) / piece.rate
             if not found or not np.array_equal(found[-1][1:], row, equal_nan=True):
-                found.append((station, *row))
+                found.append((piece.station + (a - piece.s) / piece.rate, *row))
     return np.array(found or [(0.0, *[math.nan] * 4)], dtype=np.float64)
 
 
-def _shoulder(road: Road, number: int, lane_id: int, s: Float, way: int) -> tuple[float, float]:
+def _shoulder(road: Road, number: int, lane_id: int, s: Float) -> tuple[float, float]:
     """Return how far left the middle of the shoulder right of a lane is, and how wide it is [m]."""
-    other = lane_id + (1 if lane_id > 0 else -1)
+    other, t = lane_id + (1 if lane_id > 0 else -1), borders(road, number, s)
     lane = road.sections[number].lane(other)
-    if lane is None or lane.type not in ("shoulder", "stop") or (lane_id < 0) != (way > 0):
+    is_right = (lane_id < 0) == (road.direction(lane_id) > 0)
+    if lane is None or lane.type not in ("shoulder", "stop") or not is_right:
         return 0.0, 0.0
-    t = borders(road, number, s)
-    aside = 0.5 * (np.abs(t[other] - t[lane_id]) + np.abs(t[lane_id] - t[inner(lane_id)]))
-    return -float(aside.min()), float(np.abs(t[other] - t[lane_id]).min())
+    aside = 0.5 * np.abs(t[other] - t[inner(lane_id)])
+    # Rounded: on a bend the same shoulder would have many rows.
+    return -round(float(aside.min()), 3), round(float(np.abs(t[other] - t[lane_id]).min()), 3)
 
 
 def stop_lines(model: OpenDrive, route: Route, lights: Sequence[str]) -> list[StopLine]:

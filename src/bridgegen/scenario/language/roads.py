@@ -5,7 +5,7 @@ name of a parameter of the static axis; without a word about it, a static parame
 own name, or else the template's usual value.
 """
 
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
@@ -164,6 +164,10 @@ class Change:
     at: Quantity
     road_type: RoadType | Literal[""] = ""
     markings: Literal["none", ""] = ""
+
+    def placed(self, measure: Callable[[Quantity], float]) -> tuple[float, str, str]:
+        """Return it with a number in place of a parameter's name."""
+        return measure(self.at), self.road_type, self.markings
 
 
 @dataclass(frozen=True)

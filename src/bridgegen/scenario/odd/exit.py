@@ -152,8 +152,7 @@ class _Span(Term):
 class _Followed(States):
     """What a scenario states, and limits in place of formulas of the weather, and of changes.
 
-    Attributes:
-        changes: of the road: the quantity, its number before and after, and the states after.
+    Those of the road are the quantity, its number before and after, and the states after.
     """
 
     changes: tuple[tuple[str, int, int, States], ...] = ()

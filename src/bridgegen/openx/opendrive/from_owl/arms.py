@@ -273,29 +273,21 @@ def road_of(
 
 def _changing(road: Road, at: float, kind: str, marking: str) -> Road:
     """Return a road that has another type or other markings from ``at`` [m] on; "": as before."""
-    types, sections = road.types, road.sections
     if kind:
-        types = (*types, replace(types[0], s=at, type=kind))
+        road = replace(road, types=(*road.types, replace(road.types[0], s=at, type=kind)))
     if marking:
-        sections = tuple(
-            replace(
-                section,
-                left=_marked(section.left, at, marking),
-                center=_marked(section.center, at, marking),
-                right=_marked(section.right, at, marking),
+        more = (RoadMark(at, marking),)
+        sides = {
+            side: tuple(
+                lane
+                if lane.road_marks == NONE
+                else replace(lane, road_marks=lane.road_marks + more)
+                for lane in getattr(road.sections[0], side)
             )
-            for section in sections
-        )
-    return replace(road, types=types, sections=sections)
-
-
-def _marked(lanes: tuple[Lane, ...], at: float, marking: str) -> tuple[Lane, ...]:
-    return tuple(
-        lane
-        if lane.road_marks == NONE
-        else replace(lane, road_marks=(*lane.road_marks, RoadMark(at, marking)))
-        for lane in lanes
-    )
+            for side in ("left", "center", "right")
+        }
+        road = replace(road, sections=(replace(road.sections[0], **sides),))
+    return road
 
 
 def _with_turns(arm: Arm, sections: tuple[LaneSection, ...]) -> tuple[LaneSection, ...]:

@@ -14,6 +14,7 @@ from bridgegen.scenario.ontology.vocabulary import Subject
 
 _SLACK = 1e-9
 _CLOSES = ("closes_above_fog_density", "closes_above_precipitation")
+_LATER = ("road", "marking")
 _STRIPS = {"Shoulder": "shoulder", "Sidewalk": "sidewalk"}
 
 
@@ -95,14 +96,11 @@ def _change(
 ) -> tuple[float, str, str] | None:
     """Return from where on a road is different [m], and its type and markings there."""
     at = individuals.optional_number(leg, "has_change_at")
-    if at is None:
-        return None
-    if not 0.0 < at < length:
+    if at is not None and not 0.0 < at < length:
         what = individuals.describe(leg)
         problems.append(f"{what}: has_change_at [m] must lie on it, 0 to {length:g}, got {at:g}")
-    later = ("has_later_road_type", "has_later_marking_type")
-    kind, marking = (individuals.optional_text(leg, name) or "" for name in later)
-    return at, kind, marking
+    kind, marking = (individuals.optional_text(leg, f"has_later_{x}_type") for x in _LATER)
+    return None if at is None else (at, kind or "", marking or "")
 
 
 def _about(
