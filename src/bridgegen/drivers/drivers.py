@@ -41,12 +41,8 @@ class Origin(Enum):
 EXIT, DEMAND = 0, 1
 """Columns of ``Rollout.transitions``."""
 
-MANOEUVRES = {
-    "+stop-in-lane": "Outside its ODD it stops in its lane.",
-    "+stop-on-shoulder": "Outside its ODD it stops on the shoulder to its right, or in its lane.",
-}
-"""Ends of the names of drivers with a minimal-risk manoeuvre, see ``_odd_kernels``, and what each
-does; by its place ``Plan.stops_in_lane``, from 1 on."""
+STOP_IN_LANE = "+stop-in-lane"
+"""End of the name of a driver with a minimal-risk manoeuvre, see ``_odd_kernels``."""
 
 TIME_LIMIT = 10.0
 """Default time limit of one call of a user's driver [s]."""
@@ -94,7 +90,7 @@ class Driver:
         domain: where it means to drive: words of `bridgegen.drivers.planners.DOMAINS`;
             empty: it does not say.
         called: what the user calls it (``--name``); empty: as its name says.
-        manoeuvre: of `MANOEUVRES`, where its operational design domain is left; "": none.
+        stops_in_lane: whether it stops where its operational design domain is left.
     """
 
     name: str
@@ -107,12 +103,12 @@ class Driver:
     spec: str = ""
     domain: frozenset[str] = frozenset()
     called: str = field(default="", compare=False)
-    manoeuvre: str = ""
+    stops_in_lane: bool = False
 
     @property
     def kernel(self) -> str:
         """The name of the driver that ships whose kernel drives."""
-        return self.name.removesuffix(self.manoeuvre)
+        return self.name.removesuffix(STOP_IN_LANE)
 
     @property
     def is_own(self) -> bool:
@@ -231,7 +227,7 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         name: of one that ships, of a planner, or a user's own: ``package.module:Class``,
             ``file.py:Class`` (or a compiled driver's function), ``file.fmu``; or where it runs,
             as ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``. It is loaded when it drives.
-            One that ships may end in one of `MANOEUVRES`.
+            One that ships may end in `STOP_IN_LANE`.
         ideal: stages to idealise.
         time_limit: [s] that one call of a user's own driver may take.
 
@@ -248,11 +244,11 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         )
     if name in known:
         return known[name].idealised(ideal)
-    end = manoeuvre_of(name)
-    if name.removesuffix(end) in DRIVERS:
-        driver = DRIVERS[name.removesuffix(end)]
-        what = f"{driver.description} {MANOEUVRES[end]}"
-        return replace(driver, name=name, description=what, manoeuvre=end).idealised(ideal)
+    if name.removesuffix(STOP_IN_LANE) in DRIVERS:
+        driver = DRIVERS[name.removesuffix(STOP_IN_LANE)]
+        what = f"{driver.description} Outside its ODD it stops in its lane."
+        driver = replace(driver, name=name, description=what, stops_in_lane=True)
+        return driver.idealised(ideal)
     if is_remote(name):
         address_of(name)
     spec, what, domain = name, "A driver of the user's own.", frozenset[str]()
@@ -272,11 +268,6 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         domain=domain,
     )
     return own.idealised(ideal)
-
-
-def manoeuvre_of(name: str) -> str:
-    """Return which of `MANOEUVRES` a driver's name ends in; "": none."""
-    return next((end for end in MANOEUVRES if name.endswith(end)), "")
 
 
 def is_planner(name: str) -> bool:
@@ -321,10 +312,6 @@ def listed() -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [
         (item.name, item.description, join(item.stages), "ships", "", in_order(item.domain), "")
         for item in DRIVERS.values()
-    ]
-    rows += [
-        (f"DRIVER{end}", f"One that ships, and: {what}", "", "ships", *blank)
-        for end, what in MANOEUVRES.items()
     ]
     rows += [
         (guest.name, guest.description, join(guest.stages), f"in {guest.home}", *blank)
