@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from bridgegen.base import elementary
 from bridgegen.base.errors import OntologyError
@@ -277,7 +277,7 @@ def _changing(road: Road, at: float, kind: str, marking: str) -> Road:
         road = replace(road, types=(*road.types, replace(road.types[0], s=at, type=kind)))
     if marking:
         more = (RoadMark(at, marking),)
-        sides = {
+        sides: dict[str, Any] = {
             side: tuple(
                 lane
                 if lane.road_marks == NONE
