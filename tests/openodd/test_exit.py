@@ -67,7 +67,7 @@ def test_the_kernel_judges_a_weather_as_the_odd_judges_the_row_that_states_it(
     weather[:, column("cloud")] = columns["cloudiness"] / 100
     weather[:, column("friction_scale")] = columns["friction"]
     weather[:, column("sun_elevation")] = np.radians(columns["sun_altitude_angle"])
-    outside = np.array([is_outside(one, np.array(rows)) for one in weather])
+    outside = np.array([is_outside(one, np.nan, np.nan, np.array(rows)) for one in weather])
     assert 0 < outside.sum() < 3000
     np.testing.assert_array_equal(~outside, fit.inside(columns))
 
@@ -122,6 +122,68 @@ def test_without_the_manoeuvre_the_domain_is_left_all_the_same_and_the_driver_dr
     np.testing.assert_array_equal(one.v[0, :, :until], other.v[0, :, :until])
     violated = [r.criterion.id for r in drives_on.monitor.results(other, 0) if r.margin <= 0.0]
     assert violated == ["demand", "standstill"]
+
+
+CHANGES = "changes: {at: 400.0, markings: none}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "at"),
+    [
+        (CHANGES, 400.0),
+        ("changes: {at: 310.0, road_type: rural}", 310.0),
+    ],
+)
+def test_a_domain_is_left_where_the_vehicles_front_is_past_the_roads_change(changes, at, tmp_path):
+    scenario = _changed(tmp_path, (CHANGES, changes), name="markings-end")
+    pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego=STOPS))
+    X = _usual(pipeline)
+    rollout = pipeline.rollout(X)
+    left, demands = rollout.transitions[0]
+    front = rollout.x[0, 0] + 3.7  # the road runs along x
+    assert front[left - 1] < at <= front[left]
+    assert (demands - left) * rollout.time_step == pytest.approx(1.0)
+
+    margins = pipeline.monitor.results(rollout, 0)
+    assert all(one.verdict == "met" for one in margins)
+
+    files = write_scenario(pipeline, X[0], tmp_path, "one")
+    road = files[1].read_text("utf-8")
+    assert road.count(f'<type s="{at}" type="rural"') + road.count(f'sOffset="{at}"') > 0
+    result = simulate_file(files[2], criteria=pipeline.scenario.criteria)
+    assert [one.margin for one in result.criteria] == [one.margin for one in margins]
+
+
+@pytest.mark.parametrize(
+    ("asks", "left"),
+    [
+        ("lane_marking: no_lane_marking", "lane_marking = none"),
+        ("lane_marking: [clear_lane_marking, no_lane_marking]\n    visibility: '> 9 m'", "visual"),
+        ("drivable_area_edge: line_markers", "lane_marking = clear"),
+    ],
+)
+def test_an_attribute_of_the_road_is_followed_where_its_change_matters(asks, left, tmp_path):
+    old = ("lane_marking: clear_lane_marking", asks)
+    (line,) = watched(_changed(tmp_path, old, name="markings-end")).to_lines()
+    assert left in line
+    assert ("the weather is" in line) == (left == "visual")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        (CHANGES, "changes: {at: 400.0}", ("road_type or markings", "line")),
+        (CHANGES, "changes: {at: 2500.0, markings: none}", ("2400", "2500", "line")),
+        (CHANGES, "changes: {at: ego_speed, markings: none}", ("ego_speed", "static", "line")),
+        (CHANGES, "changes: {at: 400.0, road_type: rural}\n", ("nothing", "road changes")),
+    ],
+)
+def test_a_change_of_the_road_that_is_wrong_is_refused(old, new, named, tmp_path):
+    changes = [(old, new)]
+    if "nothing" in named:
+        changes.append(("    drivable_area_type: motorway\n", ""))
+    with refuses(ScenarioError, *named):
+        watched(_changed(tmp_path, *changes, name="markings-end"))
 
 
 def test_a_users_driver_sees_the_weather_and_demands_a_transition(tmp_path):

@@ -10,11 +10,14 @@ driver steers all the time, begins no lane change any more, and brakes harder wh
 clears up meanwhile changes nothing.
 """
 
+import math
+
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
-
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._following_kernels import COMFORT_DECELERATION
+from bridgegen.drivers._gap_kernels import leads_on
+from bridgegen.drivers._weather_columns import WEATHER
 from bridgegen.drivers.drivers import DEMAND, EXIT
 from bridgegen.drivers.kinds import HAZARD
 
@@ -24,15 +27,21 @@ JERK = 1.0  # m/s³, with which the braking builds up; ours
 SAME_TIME = 1e-9  # s
 
 COLUMN, LOW, HIGH, GROUP = range(4)
-"""Columns of ``Plan.limits``: of the weather, between what it lies, and its group's number."""
+"""Columns of ``Plan.limits``: of the weather, or `WEATHER` and more of the road, between what it
+lies, and its group's number."""
+
+STATION, ROAD_TYPE, LANE_MARKING = range(3)
+"""Columns of ``Roads.classes``, see `bridgegen.drivers.scene.classes_along`."""
 
 
 @kernel
-def is_outside(weather, limits):
-    """Return whether a weather keeps none of the limits of some group.
+def is_outside(weather, road_type, lane_marking, limits):
+    """Return whether weather and road keep none of the limits of some group.
 
     Args:
         weather: ``(WEATHER,)``, see ``_weather_columns``.
+        road_type: the number of the road's class; NaN, as of ``lane_marking``: unknown, kept.
+        lane_marking: 1 if there is one, else 0.
         limits: ``(K, 4)``, see `COLUMN`; those of a group follow each other.
     """
     kept = True
@@ -41,19 +50,40 @@ def is_outside(weather, limits):
             if not kept:
                 return True
             kept = False
-        value = weather[int(limits[i, COLUMN])]
-        kept = kept or (limits[i, LOW] <= value and value <= limits[i, HIGH])
+        column = int(limits[i, COLUMN])
+        value = road_type if column == WEATHER else lane_marking
+        if column < WEATHER:
+            value = weather[column]
+        is_unknown = column >= WEATHER and math.isnan(value)
+        kept = kept or is_unknown or (limits[i, LOW] <= value and value <= limits[i, HIGH])
     return not kept
 
 
 @kernel
-def heed_domain(k, demanded, plan, state):
+def class_at(classes, s):
+    """Return the row of ``classes`` that holds at a station."""
+    row = 0
+    while row + 1 < classes.shape[0] and classes[row + 1, STATION] <= s:
+        row += 1
+    return row
+
+
+@kernel
+def heed_domain(k, demanded, plan, roads, state):
     """Note at instant k whether the domain is left; return the acceleration [m/s²] to be had.
 
     ``demanded`` [m/s²] is what the driver asks for without regard to it.
     """
-    if state.transitions[EXIT] == 0 and is_outside(state.weather, plan.limits):
-        state.transitions[EXIT] = k + 1
+    if state.transitions[EXIT] == 0:
+        # The road counts as known along the first route alone, where the vehicle's front is.
+        road_type = lane_marking = math.nan
+        if leads_on(roads.changes, state.on[0]):
+            front = state.station[0] + plan.bodies[0, 2] + 0.5 * plan.bodies[0, 0]
+            here = class_at(roads.classes, front)
+            road_type = roads.classes[here, ROAD_TYPE]
+            lane_marking = roads.classes[here, LANE_MARKING]
+        if is_outside(state.weather, road_type, lane_marking, plan.limits):
+            state.transitions[EXIT] = k + 1
     if plan.stops_in_lane == 0 or state.transitions[EXIT] == 0:
         return demanded
     since = (k + 1 - state.transitions[EXIT]) * plan.dt

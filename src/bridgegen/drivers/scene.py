@@ -7,6 +7,7 @@ All of it comes from the map. The ways are all lane chains that lead on from whe
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -25,11 +26,13 @@ from bridgegen.drivers.right_of_way import (
     right_of_way,
 )
 from bridgegen.openx.opendrive.geometry import reference_line
+from bridgegen.openx.opendrive.lane_changes import changes, marking
 from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
 from bridgegen.openx.opendrive.legs import governs, signals_on
 from bridgegen.openx.opendrive.model import SPEED_UNITS, OpenDrive, Road
 from bridgegen.openx.opendrive.outline import outline_of
 from bridgegen.openx.opendrive.routes import Place, Route, Step, Stretch, next_stretches, plan_route
+from bridgegen.scenario.weather import ROAD_TYPES
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -59,6 +62,7 @@ class Scene(NamedTuple):
 
     Attributes:
         road: ``(P, L, 3)``, see `road_along`.
+        classes: ``(P, M, 3)``, see `classes_along`.
         stops: ``(P, S)`` [m], the stations of the stop lines of S lights on the ego's route.
         halts: ``(P, H)`` [m], the stations of the lines of stop signs on it.
         crosswalks: ``(P, C, 4)``, see `crosswalks`.
@@ -75,6 +79,7 @@ class Scene(NamedTuple):
     """
 
     road: Float
+    classes: Float
     stops: Float
     halts: Float
     crosswalks: Float
@@ -162,6 +167,7 @@ def survey(
         ways[i, : len(table)] = table
     return Scene(
         road[None],
+        classes_along(model, route)[None],
         stops[None],
         np.array([[] if route is None else stop_signs(model, route)], dtype=np.float64),
         crosswalks(model, path, step)[None],
@@ -191,6 +197,7 @@ def stacked(scenes: Sequence[Scene]) -> Scene:
     """Return the scenes of several road networks as one; what is missing is padded."""
     return Scene(
         _padded([scene.road for scene in scenes], np.inf),
+        _padded([scene.classes for scene in scenes], np.inf),
         _padded([scene.stops for scene in scenes], np.inf),
         _padded([scene.halts for scene in scenes], np.inf),
         _padded([scene.crosswalks for scene in scenes], np.inf),
@@ -254,6 +261,36 @@ def road_along(model: OpenDrive, route: Route, step: float, count: int) -> Float
         if not road.is_connecting:
             found[at, 1], found[at, 2] = _beside(road, number, lane_id, s)
     return found
+
+
+def classes_along(model: OpenDrive, route: Route | None) -> Float:
+    """Return the class of the road and its markings, from where on they are so.
+
+    Returns:
+        ``(M, 3)``: the station on the route [m], ascending; the road's class as a row of
+        `ROAD_TYPES`, NaN of others; 1 where a border of the route's lane is marked, else 0. One
+        row of NaN off the lanes.
+    """
+    found: list[tuple[float, ...]] = []
+    for piece in route.pieces if route is not None else ():
+        road = model.road(piece.road_id)
+        number = section_index(road, 0.5 * (piece.s + piece.s_end))
+        lane_id = lane_of(route.steps, piece.road_id, piece.s, piece.s_end) if route else 0
+        section = road.sections[number]
+        cuts = [kind.s for kind in road.types] + [section.s + s for s in changes(section)]
+        low, high = sorted((piece.s, piece.s_end))
+        ends = sorted({low, high, *(s for s in cuts if low < s < high)}, reverse=low != piece.s)
+        for a, b in pairwise(ends):
+            s = 0.5 * (a + b)
+            kind = next((kind.type for kind in reversed(road.types) if kind.s <= s), "")
+            marks = [marking(section, at, s - section.s) for at in (lane_id, inner(lane_id))]
+            row = (
+                ROAD_TYPES.index(kind) if kind in ROAD_TYPES else math.nan,
+                any(mark is not None and mark.type != "none" for mark in marks),
+            )
+            if not found or not np.array_equal(found[-1][1:], row, equal_nan=True):
+                found.append((piece.station + (a - piece.s) / piece.rate, *row))
+    return np.array(found or [(0.0, *[math.nan] * 2)], dtype=np.float64)
 
 
 def stop_lines(model: OpenDrive, route: Route, lights: Sequence[str]) -> list[StopLine]:

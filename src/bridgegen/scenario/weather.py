@@ -260,13 +260,20 @@ STATED_BY: Mapping[str, Parameter] = MappingProxyType(
 
 # -- limits ----------------------------------------------------------------------------------------
 
+ROAD_TYPES = ("town", "rural", "motorway")
+"""Classes of roads, by the number that limits have of ``road_type``."""
+
+OF_THE_ROAD = ("road_type", "lane_marking")
+"""Quantities of the road that limits may name: its class, see `ROAD_TYPES`, and whether its lane
+has markings, 1 or 0."""
+
 
 @dataclass(frozen=True)
 class Limit:
     """An interval of a physical quantity.
 
     Attributes:
-        name: of a physical quantity that is simulated.
+        name: of a physical quantity that is simulated, or of those `OF_THE_ROAD`.
         low: its least value, in its unit.
         high: its greatest.
     """
@@ -295,7 +302,7 @@ def read_limits(text: str) -> Limits:
     Raises:
         InputError: it is no list of limits, or names what is not simulated.
     """
-    names = [column.name for column in COLUMNS]
+    names = [*(column.name for column in COLUMNS), *OF_THE_ROAD]
     try:
         found = tuple(
             tuple(
@@ -311,7 +318,7 @@ def read_limits(text: str) -> Limits:
         raise InputError(f"limits read '0.0 <= rain <= 5.0; …', got '{text[:80]}'") from None
     for limit in (limit for group in found for limit in group):
         if limit.name not in names:
-            raise UnknownNameError("quantity of the weather", limit.name, names)
+            raise UnknownNameError("quantity of the weather or the road", limit.name, names)
     return found
 
 

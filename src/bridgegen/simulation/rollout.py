@@ -117,8 +117,8 @@ class Rollout:
             are no trailers. Coupled entities do not collide.
         progress: ``(N, 2)`` float64 [m], how far the ego's driver drove, and how far it then was
             from the end of its route; ``(0, 2)`` where unknown.
-        transitions: ``(N, 2)`` int64, the instants at which the weather left the ego's operational
-            design domain, and at which its driver demanded that a human takes over; -1: never.
+        transitions: ``(N, 2)`` int64, the instants at which the ego's operational design domain
+            was left, and at which its driver demanded that a human takes over; -1: never.
             ``(0, 2)`` where the ego states no such domain.
         corridors: ``(P, L, 8)`` float64, the room beside the ego's route on each road network, at
             every sample of it, see `bridgegen.drivers.lane_tables.corridor_along`; +inf beyond its

@@ -191,7 +191,7 @@ class Monitor:
         entity = reading.of[-1]
         if reading.name in OF_DOMAIN and not (self._has_odd and entity in ("ego", known_as)):
             problems.append(
-                f"'{entity}.{reading.name}' needs an ego whose ODD limits the weather (odd: or "
+                f"'{entity}.{reading.name}' needs an ego that can leave an ODD (odd: or "
                 f"--odd){where}"
             )
         others = (ANY, *self._entities[1:]) if pair else ("ego", *self._entities)

@@ -159,7 +159,7 @@ _STATES = (
 )
 
 _OF_DOMAIN = (
-    Signal("outside_odd", "s", "time since the weather left its ODD; 0 before", _since(EXIT)),
+    Signal("outside_odd", "s", "time since its ODD was left; 0 before", _since(EXIT)),
     Signal(
         "demanding", "s", "time since its driver demanded a transition; 0 before", _since(DEMAND)
     ),

@@ -244,10 +244,13 @@ def _between(
             yield "centre", points(road, s, border)
             continue
         lane = section.lane(inner) if right * left > 0 else section.center[0]
-        marks = {mark.type for mark in lane.road_marks} - {"none"} if lane else set()
-        if marks:
-            kind = "solid" if any("solid" in mark for mark in marks) else "broken"
-            yield kind, points(road, s, border)
+        marks = sorted(lane.road_marks if lane else (), key=lambda mark: mark.s)
+        ends = [section.s + mark.s for mark in marks[1:]]
+        for mark, low, high in zip(marks, [-math.inf, *ends], [*ends, math.inf], strict=True):
+            here = (low <= s) & (s <= high)
+            if mark.type != "none" and here.sum() > 1:
+                kind = "solid" if "solid" in mark.type else "broken"
+                yield kind, points(road, s[here], border[here])
 
 
 def _waits(model: OpenDrive, road: Road, contact: str) -> bool:
@@ -387,6 +390,8 @@ def _stations(road: Road, index: int, step: float) -> Float:
             bending.append((geometry.s, end))
     for lane in section.lanes:
         cuts.update(breaks(road, section, lane))
+    for lane in (*section.lanes, *section.center):
+        cuts.update(section.s + mark.s for mark in lane.road_marks)
     records = [(section.s, lane.widths) for lane in section.lanes] + [(0.0, road.lane_offsets)]
     for origin, cubics in records:
         for position, cubic in enumerate(cubics):

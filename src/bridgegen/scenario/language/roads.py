@@ -8,7 +8,7 @@ own name, or else the template's usual value.
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from bridgegen.scenario.language.parameters import Axis, Derived, Parameter, nearest
 
@@ -151,6 +151,20 @@ class Segment:
     end_curvature: Quantity
 
 
+class Change(NamedTuple):
+    """What of a road is different from a place on; "" is as before.
+
+    Attributes:
+        at: the place, from the road's start [m].
+        road_type: its class from there on.
+        markings: how its lanes are marked from there on.
+    """
+
+    at: Quantity
+    road_type: RoadType | Literal[""] = ""
+    markings: Literal["none", ""] = ""
+
+
 @dataclass(frozen=True)
 class RoadsSpec:
     """A road network as a scenario file describes it.
@@ -165,6 +179,7 @@ class RoadsSpec:
         road_type: what kind of road it is.
         left_hand: whether traffic drives on the left: then this is its mirror image.
         country: by whose law priority is judged, a code of ISO 3166-1; "": none is stated.
+        change: of a road: what is different from a place on; None: nothing.
     """
 
     template: Template
@@ -176,10 +191,12 @@ class RoadsSpec:
     road_type: RoadType = "town"
     left_hand: bool = False
     country: str = ""
+    change: Change | None = None
 
     def __repr__(self) -> str:
         """Return its contents in canonical form, for a scenario's fingerprint."""
         more = f", {self.left_hand!r}, {self.country!r}" if self.left_hand or self.country else ""
+        more += f", {self.change!r}" if self.change else ""
         return (
             f"RoadsSpec({self.template!r}, {dict(sorted(self.knobs.items()))!r}, "
             f"{dict(sorted(self.legs.items()))!r}, {self.segments!r}, {self.crosswalk_at!r}, "
@@ -199,7 +216,8 @@ class RoadsSpec:
             for segment in self.segments
             for q in (segment.length, segment.curvature, segment.end_curvature)
         ]
-        return frozenset(q for q in (*self.knobs.values(), *bends) if isinstance(q, str))
+        places = () if self.change is None else (self.change.at,)
+        return frozenset(q for q in (*self.knobs.values(), *bends, *places) if isinstance(q, str))
 
     @property
     def closes(self) -> dict[str, Quantity]:

@@ -10,6 +10,7 @@ from bridgegen.scenario.language.roads import (
     HEADINGS,
     KNOBS,
     LETTERS,
+    Change,
     LegSpec,
     RoadsSpec,
     RoadType,
@@ -57,7 +58,7 @@ def read_roads(
         report(problem, ("roads", name))
     legs = _legs(template, given, report)
     if template != "road":
-        for key in ("segments", "crosswalk_at"):
+        for key in ("segments", "crosswalk_at", "changes"):
             if getattr(given, key):
                 report(f"template {template} has no '{key}'", ("roads", key))
     if template not in ("crossroads", "t-junction") and given.signals != "none":
@@ -86,6 +87,15 @@ def read_roads(
             f"crosswalk_at [m] must lie on the road, 0 to {length:g}, got {at:g}",
             ("roads", "crosswalk_at"),
         )
+    change = None
+    if given.changes is not None:
+        later = given.changes
+        change = Change(later.at, later.road_type or "", later.markings or "")
+        length = length if straight else 10_000.0  # segments say it as they are built
+        for problem in _measure("at", change.at, 1.0, float(length), known, declared):
+            report(problem, ("roads", "changes"))
+        if not (change.road_type or change.markings):
+            report("changes must say road_type or markings", ("roads", "changes"))
     usual: RoadType = "motorway" if template == "merge" else "town"
     return RoadsSpec(
         template,
@@ -95,6 +105,7 @@ def read_roads(
         given.crosswalk_at,
         given.signals,
         given.road_type or usual,
+        change=change,
     )
 
 
@@ -175,7 +186,7 @@ def _measure(
     known: Mapping[str, Parameter | Derived],
     declared: Set[str],
 ) -> Iterator[str]:
-    unit = "m" if key == "length" else "1/m"
+    unit = "m" if key in ("length", "at") else "1/m"
     if not isinstance(value, str):
         if not low <= value <= high:
             yield f"{key} [{unit}] must be {low:.4g} to {high:.4g}, got {value:g}"

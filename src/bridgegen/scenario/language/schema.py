@@ -79,6 +79,17 @@ class SegmentSection(ShapedSection):
     """Curvature at the segment's end [1/m]; that at its start by default."""
 
 
+class ChangeSection(ShapedSection):
+    """What of a road is different from a place on."""
+
+    at: Length
+    """Distance of the place from the start of the road [m]."""
+    road_type: Literal["town", "rural", "motorway"] | None = None
+    """Type of the road from there on; as before by default."""
+    markings: Literal["none"] | None = None
+    """Markings of the lanes from there on: none; as before by default."""
+
+
 class RoadsSection(ShapedSection):
     """The road network: its legs and its template parameters (see ``roads.KNOBS``)."""
 
@@ -94,6 +105,8 @@ class RoadsSection(ShapedSection):
     """Traffic lights of a junction: none, or a phase for each pair of opposite legs."""
     road_type: Literal["town", "rural", "motorway"] | None = None
     """Type of the road."""
+    changes: ChangeSection | None = None
+    """Place from which on a road without junction has another type, or no markings."""
     lane_width: Length | None = None
     speed_limit: Speed | None = None
     sidewalk_width: Length | None = None

@@ -1,6 +1,7 @@
-"""What of an operational design domain a drive can leave: limits of the weather, which may change.
+"""What of an operational design domain a drive can leave: limits of what may change.
 
-All else that a scenario states, such as its roads, stays as it is at the start.
+That is the weather, and the class and the markings of a road that change along the way.
+All else that a scenario states stays as it is at the start.
 """
 
 import math
@@ -10,6 +11,7 @@ from typing import Any
 
 from bridgegen.base.errors import ScenarioError
 from bridgegen.scenario.language.expression import Expression, parse
+from bridgegen.scenario.language.roads import RoadsSpec
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.odd.bounding import clauses_of, tree_of
 from bridgegen.scenario.odd.reader import Condition, Odd, odd_in
@@ -22,7 +24,7 @@ from bridgegen.scenario.odd.states import (
     spans_of,
     states_of,
 )
-from bridgegen.scenario.weather import Limit, Limits, limits_text
+from bridgegen.scenario.weather import OF_THE_ROAD, ROAD_TYPES, Limit, Limits, limits_text
 
 FOLLOWED = {
     "rain": ("rain", 1.0),
@@ -40,7 +42,7 @@ class Watched:
     """An ODD as far as a drive can leave it.
 
     Attributes:
-        limits: that the weather keeps.
+        limits: that the weather and the road keep.
         gaps: conditions that are judged at the start only, or not at all, each with the reason.
     """
 
@@ -55,7 +57,10 @@ class Watched:
     def to_lines(self) -> tuple[str, ...]:
         """Return in words what may be left, and what is not followed."""
         groups = map(_in_words, self.limits)
-        lines = [f"the weather is within the ODD where {', '.join(groups)}"]
+        names = {limit.name for group in self.limits for limit in group}
+        parts = {"weather": names - {*OF_THE_ROAD}, "road": names & {*OF_THE_ROAD}}
+        what = " and the ".join(part for part, limited in parts.items() if limited)
+        lines = [f"the {what} is within the ODD where {', '.join(groups)}"]
         if not self.limits:
             lines = ["no weather leaves the ODD"]
         if self.gaps:
@@ -75,7 +80,10 @@ def _in_words(group: Sequence[Limit]) -> str:
             joined.append(limit)
     said = []
     for name, low, high in ((each.name, each.low, each.high) for each in joined):
-        if high == math.inf:
+        if name in OF_THE_ROAD:
+            words = ROAD_TYPES if name == "road_type" else ("none", "clear")
+            said.append(f"{name} = {words[int(low)]}")
+        elif high == math.inf:
             said.append(f"{name} ≥ {low:g}")
         else:  # what is never below 0 needs no lower end there
             above = low >= 0.0 or (name == "sun_elevation" and low > -math.inf)
@@ -101,7 +109,8 @@ def watched(scenario: LogicalScenario, *, on_map: bool = False) -> Watched | Non
             return None
         odd = odd_in(own)
     size_of(odd)
-    followed = _Followed(**vars(states_of(scenario, on_map=on_map)))
+    states = states_of(scenario, on_map=on_map)
+    followed = _Followed(**vars(states), changes=() if on_map else _changes(states, scenario.roads))
     gaps, refused = dict[str, str](), list[str]()
     tree = tree_of(odd.formula, True, odd, followed, gaps, refused)
     if tree is False:
@@ -109,14 +118,27 @@ def watched(scenario: LogicalScenario, *, on_map: bool = False) -> Watched | Non
         raise ScenarioError(f"{scenario.name} lies outside its ODD from the start: {why}")
     found = () if tree is True else tuple(clauses_of(tree))
     if not all(isinstance(term, _Span) for clause in found for term in clause):
-        raise ScenarioError(f"{scenario.name}: its ODD asks too much of the weather at once")
+        raise ScenarioError(f"{scenario.name}: its ODD asks too much at once")
     if not found and own is not None and scenario.odd is None:
         raise ScenarioError(
-            f"{scenario.name}: nothing of its ODD limits the weather, which alone changes "
-            f"during a drive ({own.at(())})"
+            f"{scenario.name}: nothing of its ODD limits the weather, or what of its road "
+            f"changes, which alone change during a drive ({own.at(())})"
         )
     limits = tuple(tuple(term.limit for term in clause) for clause in found)  # type: ignore[attr-defined]
     return Watched(limits, gaps)
+
+
+def _changes(states: States, roads: RoadsSpec) -> tuple[tuple[str, int, int, States], ...]:
+    """Return `_Followed.changes`."""
+    found, later = list[tuple[str, int, int, States]](), roads.change
+    if later is not None and later.road_type:
+        facts = states.facts - {roads.road_type} | {later.road_type}
+        before, after = (ROAD_TYPES.index(kind) for kind in (roads.road_type, later.road_type))
+        found.append(("road_type", before, after, replace(states, facts=facts)))
+    if later is not None and later.markings:
+        facts = states.facts - {"marked"} | {"unmarked"}
+        found.append(("lane_marking", 1, 0, replace(states, facts=facts)))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -128,11 +150,20 @@ class _Span(Term):
 
 @dataclass(frozen=True)
 class _Followed(States):
-    """What a scenario states, and of its weather limits in place of formulas."""
+    """What a scenario states, and limits in place of formulas of the weather, and of changes.
+
+    Those of the road are the quantity, its number before and after, and the states after.
+    """
+
+    changes: tuple[tuple[str, int, int, States], ...] = ()
 
     def holds(self, condition: Condition, positive: bool, odd: Odd) -> Any:
         """See `States.holds`; limits, joined as `tree_of` does, in place of the rows."""
         found = super().holds(condition, positive, odd)
+        for name, before, after, states in self.changes if isinstance(found, bool) else ():
+            if states.holds(condition, positive, odd) is not found:
+                value = float(before if found else after)
+                return _Span(parse("1 == 1"), condition.name, Limit(name, value, value))
         return "stays as it is at the start" if type(found) is Term else found
 
     def _of_quantity(

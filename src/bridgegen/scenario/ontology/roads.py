@@ -88,6 +88,11 @@ def _add_road(builder: Builder, leg: Leg, index: int, road: ArmRoad) -> ox.Named
         put(node, "has_road_type", road.road_type)
     if road.grade != 0.0 or isinstance(road.grade, Searched):
         quantity(node, "has_grade", road.grade)
+    if road.change is not None:
+        quantity(node, "has_change_at", road.change[0])
+        for name, later in zip(("road", "marking"), road.change[1:], strict=True):
+            if later:
+                put(node, f"has_later_{name}_type", later)
     for name, limit in road.closes.items():
         quantity(node, f"closes_above_{name}", limit)
     for number, segment in enumerate(road.segments, start=1):

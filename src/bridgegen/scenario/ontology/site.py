@@ -76,6 +76,8 @@ class ArmRoad:
         segments: of its reference line; empty: straight.
         counts: number of lanes in and out, where a parameter gives it.
         grade: its rise along the reference line by its length [1].
+        change: of a road that meets no junction: where it is different from [m], its type and its
+            markings from there on; "": as before.
         closes: weather parameters beyond which it is closed, with the limits [%].
         station: where on the reference line distances begin [m], if not at the road's end.
         bends: of a map: absolute curvature of its reference line [1/m] at even steps from its
@@ -90,6 +92,7 @@ class ArmRoad:
     road_type: str | None = None
     segments: tuple[SiteSegment, ...] = ()
     grade: float = 0.0
+    change: tuple[float, str, str] | None = None
     counts: Mapping[Direction, float] = field(default_factory=lambda: MappingProxyType({}))
     closes: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     station: float | None = None

@@ -136,6 +136,7 @@ class Roads(NamedTuple):
     cells: Float
     cell_nodes: Int
     road: Float
+    classes: Float
     stops: Float
     halts: Float
     crosswalks: Float

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from bridgegen.base import elementary
 from bridgegen.base.errors import OntologyError
@@ -159,6 +159,7 @@ class Arm:
         strips_out: beside the lanes away from it.
         turns: where each inbound lane leads, innermost first; empty: by rule.
         road_type: OpenDRIVE's.
+        change: from where on it is different [m], its type and its markings there; "": as before.
         grade: its rise along the reference line, by its length.
         objects: what lies on it.
         signals: what stands beside it.
@@ -177,6 +178,7 @@ class Arm:
     strips_out: Strips = ()
     turns: tuple[frozenset[str], ...] = ()
     road_type: str = "town"
+    change: tuple[float, str, str] | None = None
     grade: float = 0.0
     objects: tuple[Object, ...] = field(default=())
     signals: tuple[Signal, ...] = field(default=())
@@ -251,7 +253,7 @@ def road_of(
         sections: its lanes, where they change along it.
     """
     link = None if junction_id is None else RoadLink("junction", junction_id)
-    return Road(
+    road = Road(
         id=arm.road_id,
         length=arm.length,
         name=arm.name,
@@ -266,6 +268,26 @@ def road_of(
         signals=arm.signals,
         user_data=arm.user_data,
     )
+    return road if arm.change is None else _changing(road, *arm.change)
+
+
+def _changing(road: Road, at: float, kind: str, marking: str) -> Road:
+    """Return a road that has another type or other markings from ``at`` [m] on; "": as before."""
+    if kind:
+        road = replace(road, types=(*road.types, replace(road.types[0], s=at, type=kind)))
+    if marking:
+        more = (RoadMark(at, marking),)
+        sides: dict[str, Any] = {
+            side: tuple(
+                lane
+                if lane.road_marks == NONE
+                else replace(lane, road_marks=lane.road_marks + more)
+                for lane in getattr(road.sections[0], side)
+            )
+            for side in ("left", "center", "right")
+        }
+        road = replace(road, sections=(replace(road.sections[0], **sides),))
+    return road
 
 
 def _with_turns(arm: Arm, sections: tuple[LaneSection, ...]) -> tuple[LaneSection, ...]:

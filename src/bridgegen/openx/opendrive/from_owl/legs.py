@@ -14,6 +14,7 @@ from bridgegen.scenario.ontology.vocabulary import Subject
 
 _SLACK = 1e-9
 _CLOSES = ("closes_above_fog_density", "closes_above_precipitation")
+_LATER = ("road", "marking")
 _STRIPS = {"Shoulder": "shoulder", "Sidewalk": "sidewalk"}
 
 
@@ -77,6 +78,7 @@ def read_arm(
         turns=lanes.turns(),
         road_type=individuals.optional_text(leg, "has_road_type") or "town",
         grade=grade,
+        change=_change(individuals, leg, length, problems),
         objects=tuple(objects_on(individuals, leg, lanes.reach, length, problems)),
         signals=tuple(signals_on(individuals, leg, lanes.reach, junction_end, problems)),
         user_data=tuple(_about(individuals, leg, heading, junction_end)),
@@ -87,6 +89,18 @@ def read_arm(
             "road's start, or on a road that meets none"
         )
     return arm
+
+
+def _change(
+    individuals: Individuals, leg: Subject, length: float, problems: list[str]
+) -> tuple[float, str, str] | None:
+    """Return from where on a road is different [m], and its type and markings there."""
+    at = individuals.optional_number(leg, "has_change_at")
+    if at is not None and not 0.0 < at < length:
+        what = individuals.describe(leg)
+        problems.append(f"{what}: has_change_at [m] must lie on it, 0 to {length:g}, got {at:g}")
+    kind, marking = (individuals.optional_text(leg, f"has_later_{x}_type") for x in _LATER)
+    return None if at is None else (at, kind or "", marking or "")
 
 
 def _about(

@@ -13,13 +13,14 @@ import numpy as np
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
+from bridgegen.drivers._weather_columns import WEATHER
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import object_class_of
 from bridgegen.openx.openscenario.declarations import ODD, SIREN
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.values import Value
-from bridgegen.scenario.weather import column, read_limits
+from bridgegen.scenario.weather import OF_THE_ROAD, column, read_limits
 from bridgegen.simulation.embedded._codes import LAYOUT_WIDTH, RIGID, THROUGH, WEIGHTED
 from bridgegen.simulation.embedded.compiler.curves import basis, bends, sampled
 from bridgegen.simulation.embedded.compiler.positions import Positions, is_fixed
@@ -349,7 +350,10 @@ def limits_of(body: Body, place: str) -> Float:
         except InputError as error:
             raise InputError(f"{place}: property {ODD} of the ego: {error}") from None
         for number, group in enumerate(limits):
-            rows += [(column(each.name), each.low, each.high, number) for each in group]
+            for each in group:
+                is_road = each.name in OF_THE_ROAD
+                at = WEATHER + OF_THE_ROAD.index(each.name) if is_road else column(each.name)
+                rows.append((at, each.low, each.high, number))
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
