@@ -21,6 +21,7 @@ from bridgegen.scenario.odd.exit import watched
 from bridgegen.scenario.weather import column, read_limits
 
 STOPS = "reference+stop-in-lane"
+SHOULDER = "reference+stop-on-shoulder"
 
 
 def _pipeline(name, ego):
@@ -136,7 +137,7 @@ CHANGES = "changes: {at: 400.0, markings: none}"
 )
 def test_a_domain_is_left_where_the_vehicles_front_is_past_the_roads_change(changes, at, tmp_path):
     scenario = _changed(tmp_path, (CHANGES, changes), name="markings-end")
-    pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego=STOPS))
+    pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego=SHOULDER))
     X = _usual(pipeline)
     rollout = pipeline.rollout(X)
     left, demands = rollout.transitions[0]
@@ -144,6 +145,16 @@ def test_a_domain_is_left_where_the_vehicles_front_is_past_the_roads_change(chan
     assert front[left - 1] < at <= front[left]
     assert (demands - left) * rollout.time_step == pytest.approx(1.0)
 
+    # It stands in the middle of the shoulder, parallel to the road, and got there in comfort.
+    width = dict(zip(pipeline.space.names, X[0], strict=True))["lane_width"]
+    assert rollout.v[0, 0, -1] == 0.0
+    assert rollout.offset[0, 0, -1] == pytest.approx(-0.5 * (width + 2.5), abs=0.05)
+    assert abs(rollout.h[0, 0, -1]) < 0.01
+    across = rollout.v[0, 0, :-1] * np.diff(rollout.h[0, 0]) / rollout.time_step
+    assert np.abs(across).max() < 1.5
+    begins = demands + round(10.0 / rollout.time_step)
+    assert rollout.a[0, 0, begins:].min() >= -2.0 - 1e-9
+    assert np.abs(rollout.offset[0, 0, :begins]).max() < 0.1
     margins = pipeline.monitor.results(rollout, 0)
     assert all(one.verdict == "met" for one in margins)
 
@@ -152,6 +163,17 @@ def test_a_domain_is_left_where_the_vehicles_front_is_past_the_roads_change(chan
     assert road.count(f'<type s="{at}" type="rural"') + road.count(f'sOffset="{at}"') > 0
     result = simulate_file(files[2], criteria=pipeline.scenario.criteria)
     assert [one.margin for one in result.criteria] == [one.margin for one in margins]
+
+
+def test_a_shoulder_that_is_narrower_than_the_car_is_not_used(tmp_path):
+    narrow = ("shoulder_width: 2.5", "shoulder_width: 1.5")
+    scenario = _changed(tmp_path, narrow, name="markings-end")
+    pipelines = [
+        Pipeline(scenario, scenario.space(), PipelineOptions(ego=ego)) for ego in (STOPS, SHOULDER)
+    ]
+    one, other = (pipeline.rollout(_usual(pipeline)) for pipeline in pipelines)
+    np.testing.assert_array_equal(one.x, other.x)
+    np.testing.assert_array_equal(one.y, other.y)
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ the driver demanded that a human takes over; 0: it has not.
 
 The manoeuvre is of the simplest kind: from `PERCEPTION` after the exit the driver demands the
 transition, and drives on as before. Nobody takes over. `TRANSITION` after the demand its hazard
-lights are switched on, and it brakes to a standstill in the lane that it is on, where it stays. Its
-driver steers all the time, begins no lane change any more, and brakes harder where it has to. What
-clears up meanwhile changes nothing.
+lights are switched on, and it brakes to a standstill in the lane that it is on, where it stays; or,
+if it is to, on the shoulder to its right. Its driver steers all the time, begins no lane change any
+more, and brakes harder where it has to. What clears up meanwhile changes nothing.
 """
 
 import math
@@ -17,7 +17,8 @@ import math
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._following_kernels import COMFORT_DECELERATION
 from bridgegen.drivers._gap_kernels import leads_on
-from bridgegen.drivers._weather_columns import WEATHER
+from bridgegen.drivers._path_kernels import AFTER, BEGINS, LENGTH, shift_length
+from bridgegen.drivers._weather_columns import FRICTION, WEATHER
 from bridgegen.drivers.drivers import DEMAND, EXIT
 from bridgegen.drivers.kinds import HAZARD
 
@@ -30,8 +31,12 @@ COLUMN, LOW, HIGH, GROUP = range(4)
 """Columns of ``Plan.limits``: of the weather, or `WEATHER` and more of the road, between what it
 lies, and its group's number."""
 
-STATION, ROAD_TYPE, LANE_MARKING = range(3)
+STATION, ROAD_TYPE, LANE_MARKING, ASIDE, WIDTH = range(5)
 """Columns of ``Roads.classes``, see `bridgegen.drivers.scene.classes_along`."""
+
+ON_SHOULDER = 2  # value of ``Plan.stops_in_lane``: it stops on the shoulder, where there is one
+GENTLE = 0.5  # m/s², it brakes no less on its way to the shoulder, which it may not reach; ours
+CENTRED = 0.5  # m beside its route up to which it can leave its lane for the shoulder; ours
 
 
 @kernel
@@ -69,7 +74,7 @@ def class_at(classes, s):
 
 
 @kernel
-def heed_domain(k, demanded, plan, roads, state):
+def heed_domain(k, demanded, plan, roads, state, record):
     """Note at instant k whether the domain is left; return the acceleration [m/s²] to be had.
 
     ``demanded`` [m/s²] is what the driver asks for without regard to it.
@@ -93,7 +98,31 @@ def heed_domain(k, demanded, plan, roads, state):
     if lasts < 0.0:
         return demanded
     state.switched[0] |= HAZARD
-    return min(demanded, -min(JERK * lasts, COMFORT_DECELERATION))
+    braking = min(JERK * lasts, COMFORT_DECELERATION)
+    s, v = state.station[0], record.v[0, k]
+    if plan.stops_in_lane == ON_SHOULDER and lasts - plan.dt < -SAME_TIME:
+        choose_shoulder(s, v, record.offset[0, k], plan.bodies[0], roads, state)
+    # It stands no sooner than where it is on the shoulder.
+    rest = state.shoulder[BEGINS] + state.shoulder[LENGTH] - s
+    if rest > 0.0:
+        braking = min(braking, max(v * v / (2.0 * rest), GENTLE))
+    return min(demanded, -braking)
+
+
+@kernel
+def choose_shoulder(s, v, offset, body, roads, state):
+    """Plan how the ego gets onto the shoulder to its right, if one is there until it stands."""
+    if not leads_on(roads.changes, state.on[0]) or abs(offset) > CENTRED or v <= 0.0:
+        return
+    first = class_at(roads.classes, s)
+    aside = roads.classes[first, ASIDE]
+    length = shift_length(aside, v, state.weather[FRICTION])
+    stopping = v * (v / (2.0 * COMFORT_DECELERATION) + COMFORT_DECELERATION / JERK)
+    last = class_at(roads.classes, s + max(length, stopping) + body[0])
+    for i in range(first, last + 1):
+        if roads.classes[i, WIDTH] < body[1] or roads.classes[i, ASIDE] != aside:
+            return
+    state.shoulder[AFTER], state.shoulder[BEGINS], state.shoulder[LENGTH] = aside, s, length
 
 
 @kernel

@@ -121,6 +121,7 @@ def gather_points(at, counts, pieces, directions, x, y, cosine, sine, points, ma
 
 
 UNSHIFTED = (0.0, 0.0, 0.0, 0.0)
+BEFORE, AFTER, BEGINS, LENGTH = range(4)  # of a shift in an array
 
 LATERAL_COMFORT = 1.0  # m/s², aside of the lane's own bend; source: UN R79, ACSF category C: 1 m/s²
 LATERAL_SHARE = 0.15  # of the friction limit that a change may use

@@ -27,9 +27,10 @@ from bridgegen.drivers._gap_kernels import (
     without_joining,
 )
 from bridgegen.drivers._ghost_kernels import haunt
-from bridgegen.drivers._lane_change_kernels import LAST, change_lane, look_back, shift_of
+from bridgegen.drivers._lane_change_kernels import BEFORE, LAST, change_lane, look_back, shift_of
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.drivers._odd_kernels import stopping_for
+from bridgegen.drivers._path_kernels import LENGTH as SHOULDER_LENGTH
 from bridgegen.drivers._path_kernels import UNSHIFTED, pursue_beside, shift_speed
 from bridgegen.drivers._perception_kernels import perceive
 from bridgegen.drivers._prediction_kernels import predict, predict_truly
@@ -168,6 +169,8 @@ def drive(k, plan_, roads, state, record):
         settings(plan_.tracker, state.slots), state.sensors, state.tracks, record.detections,
     )  # fmt: skip
     haunt(k, plan_, roads, state, record)
+    if state.shoulder[SHOULDER_LENGTH] > 0.0:  # it plans for where it will be
+        mind[BEFORE : BEFORE + 4] = state.shoulder
     # By time, not by instants: so it plans as often at any step up to `CYCLE`.
     if k * plan_.dt > mind[NEXT_PLAN] - 1e-6:
         mind[NEXT_PLAN] += max(CYCLE, plan_.dt)

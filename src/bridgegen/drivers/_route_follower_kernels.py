@@ -4,7 +4,7 @@
 # Numba infers what kernels take; their wrappers are typed.
 
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._path_kernels import pursue
+from bridgegen.drivers._path_kernels import LENGTH, pursue, pursue_beside
 
 PREVIEW = 0.6  # s, pure pursuit looks this far ahead at the present speed …
 PREVIEW_MIN, PREVIEW_MAX = 3.0, 15.0  # m, … within these
@@ -31,8 +31,15 @@ def hold_speed(v, target):
 
 @kernel
 def keep_to_route(k, roads, state, record):
-    """Return the curvature [1/m] that keeps the ego to its route at instant k."""
+    """Return the curvature [1/m] that keeps the ego to its route, or its shoulder, at instant k."""
     p = state.on[0]
+    to = state.shoulder
+    if to[LENGTH] > 0.0:
+        return pursue_beside(
+            roads.paths[p], roads.counts[p], roads.steps[p], state.station[0],
+            (to[0], to[1], to[2], to[3]), record.x[0, k], record.y[0, k], record.h[0, k],
+            preview(record.v[0, k]),
+        )  # fmt: skip
     return steer(
         roads.paths[p],
         roads.counts[p],

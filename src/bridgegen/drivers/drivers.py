@@ -42,8 +42,12 @@ class Origin(Enum):
 EXIT, DEMAND = 0, 1
 """Columns of ``Rollout.transitions``."""
 
-STOP_IN_LANE = "+stop-in-lane"
-"""End of the name of a driver with a minimal-risk manoeuvre, see ``_odd_kernels``."""
+MANOEUVRES = {
+    "+stop-in-lane": "Outside its ODD it stops in its lane.",
+    "+stop-on-shoulder": "Outside its ODD it stops on the shoulder to its right, or in its lane.",
+}
+"""Ends of the names of drivers with a minimal-risk manoeuvre, see ``_odd_kernels``, and what each
+does; by its place ``Plan.stops_in_lane``, from 1 on."""
 
 TIME_LIMIT = 10.0
 """Default time limit of one call of a user's driver [s]."""
@@ -91,7 +95,7 @@ class Driver:
         domain: where it means to drive: words of `bridgegen.drivers.planners.DOMAINS`;
             empty: it does not say.
         called: what the user calls it (``--name``); empty: as its name says.
-        stops_in_lane: whether it stops where its operational design domain is left.
+        manoeuvre: of `MANOEUVRES`, where its operational design domain is left; "": none.
         settings: values of its tunable numbers that are not at their defaults.
     """
 
@@ -105,13 +109,13 @@ class Driver:
     spec: str = ""
     domain: frozenset[str] = frozenset()
     called: str = field(default="", compare=False)
-    stops_in_lane: bool = False
+    manoeuvre: str = ""
     settings: Settings = ()
 
     @property
     def kernel(self) -> str:
         """The name of the driver that ships whose kernel drives."""
-        return self.name.removesuffix(STOP_IN_LANE)
+        return self.name.removesuffix(self.manoeuvre)
 
     @property
     def is_own(self) -> bool:
@@ -230,8 +234,8 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         name: of one that ships, of a planner, or a user's own: ``package.module:Class``,
             ``file.py:Class`` (or a compiled driver's function), ``file.fmu``; or where it runs,
             as ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``. It is loaded when it drives.
-            One that ships may end in `STOP_IN_LANE`; a user's class or function and a planner in
-            ``@FILE.yaml``, see `bridgegen.drivers.tunable`.
+            One that ships may end in one of `MANOEUVRES`; a user's class or function and a planner
+            in ``@FILE.yaml``, see `bridgegen.drivers.tunable`.
         ideal: stages to idealise.
         time_limit: [s] that one call of a user's own driver may take.
 
@@ -257,11 +261,11 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         )
     if name in known:
         return known[name].idealised(ideal)
-    if name.removesuffix(STOP_IN_LANE) in DRIVERS:
-        driver = DRIVERS[name.removesuffix(STOP_IN_LANE)]
-        what = f"{driver.description} Outside its ODD it stops in its lane."
-        driver = replace(driver, name=name, description=what, stops_in_lane=True)
-        return driver.idealised(ideal)
+    end = manoeuvre_of(name)
+    if name.removesuffix(end) in DRIVERS:
+        driver = DRIVERS[name.removesuffix(end)]
+        what = f"{driver.description} {MANOEUVRES[end]}"
+        return replace(driver, name=name, description=what, manoeuvre=end).idealised(ideal)
     if is_remote(name):
         address_of(name)
     spec, what, domain = name, "A driver of the user's own.", frozenset[str]()
@@ -281,6 +285,11 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         domain=domain,
     )
     return own.idealised(ideal)
+
+
+def manoeuvre_of(name: str) -> str:
+    """Return which of `MANOEUVRES` a driver's name ends in; "": none."""
+    return next((end for end in MANOEUVRES if name.endswith(end)), "")
 
 
 def is_planner(name: str) -> bool:
@@ -327,6 +336,10 @@ def listed() -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [
         (item.name, item.description, join(item.stages), "ships", "", in_order(item.domain), "")
         for item in DRIVERS.values()
+    ]
+    rows += [
+        (f"DRIVER{end}", f"One that ships, and: {what}", "", "ships", *blank)
+        for end, what in MANOEUVRES.items()
     ]
     rows += [
         (guest.name, guest.description, join(guest.stages), f"in {guest.home}", *blank)

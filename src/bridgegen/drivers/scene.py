@@ -62,7 +62,7 @@ class Scene(NamedTuple):
 
     Attributes:
         road: ``(P, L, 3)``, see `road_along`.
-        classes: ``(P, M, 3)``, see `classes_along`.
+        classes: ``(P, M, 5)``, see `classes_along`.
         stops: ``(P, S)`` [m], the stations of the stop lines of S lights on the ego's route.
         halts: ``(P, H)`` [m], the stations of the lines of stop signs on it.
         crosswalks: ``(P, C, 4)``, see `crosswalks`.
@@ -264,12 +264,13 @@ def road_along(model: OpenDrive, route: Route, step: float, count: int) -> Float
 
 
 def classes_along(model: OpenDrive, route: Route | None) -> Float:
-    """Return the class of the road and its markings, from where on they are so.
+    """Return the class of the road, its markings and its shoulder, from where on they are so.
 
     Returns:
-        ``(M, 3)``: the station on the route [m], ascending; the road's class as a row of
-        `ROAD_TYPES`, NaN of others; 1 where a border of the route's lane is marked, else 0. One
-        row of NaN off the lanes.
+        ``(M, 5)``: the station on the route [m], ascending; the road's class as a row of
+        `ROAD_TYPES`, NaN of others; 1 where a border of the route's lane is marked, else 0; how
+        far left [m] the middle of the shoulder to its right is, negative; and how wide that is
+        [m], 0 where there is none. One row of NaN off the lanes.
     """
     found: list[tuple[float, ...]] = []
     for piece in route.pieces if route is not None else ():
@@ -281,16 +282,29 @@ def classes_along(model: OpenDrive, route: Route | None) -> Float:
         low, high = sorted((piece.s, piece.s_end))
         ends = sorted({low, high, *(s for s in cuts if low < s < high)}, reverse=low != piece.s)
         for a, b in pairwise(ends):
-            s = 0.5 * (a + b)
-            kind = next((kind.type for kind in reversed(road.types) if kind.s <= s), "")
-            marks = [marking(section, at, s - section.s) for at in (lane_id, inner(lane_id))]
+            s = np.array([a, 0.5 * (a + b), b])
+            kind = next((kind.type for kind in reversed(road.types) if kind.s <= s[1]), "")
+            marks = [marking(section, at, s[1] - section.s) for at in (lane_id, inner(lane_id))]
             row = (
                 ROAD_TYPES.index(kind) if kind in ROAD_TYPES else math.nan,
                 any(mark is not None and mark.type != "none" for mark in marks),
+                *_shoulder(road, number, lane_id, s),
             )
             if not found or not np.array_equal(found[-1][1:], row, equal_nan=True):
                 found.append((piece.station + (a - piece.s) / piece.rate, *row))
-    return np.array(found or [(0.0, *[math.nan] * 2)], dtype=np.float64)
+    return np.array(found or [(0.0, *[math.nan] * 4)], dtype=np.float64)
+
+
+def _shoulder(road: Road, number: int, lane_id: int, s: Float) -> tuple[float, float]:
+    """Return how far left the middle of the shoulder right of a lane is, and how wide it is [m]."""
+    other, t = lane_id + (1 if lane_id > 0 else -1), borders(road, number, s)
+    lane = road.sections[number].lane(other)
+    is_right = (lane_id < 0) == (road.direction(lane_id) > 0)
+    if lane is None or lane.type not in ("shoulder", "stop") or not is_right:
+        return 0.0, 0.0
+    aside = 0.5 * np.abs(t[other] - t[inner(lane_id)])
+    # Rounded: on a bend the same shoulder would have many rows.
+    return -round(float(aside.min()), 3), round(float(np.abs(t[other] - t[lane_id]).min()), 3)
 
 
 def stop_lines(model: OpenDrive, route: Route, lights: Sequence[str]) -> list[StopLine]:

@@ -86,7 +86,7 @@ def move_driven(k, demanded, curvature, plan, roads, state, record):
     """Move the ego on from instant k if its driver does; return its new x, y [m] and heading."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
     if plan.limits.shape[0] > 0:
-        demanded = heed_domain(k, demanded, plan, roads, state)
+        demanded = heed_domain(k, demanded, plan, roads, state, record)
     if plan.has_pedals:
         move_pedals(plan, state)
         if state.holds[0] and plan.is_driven:

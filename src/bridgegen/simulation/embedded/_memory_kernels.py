@@ -171,6 +171,8 @@ class State(NamedTuple):
         slots: ``(S,)`` the row's values.
         weather: ``(WEATHER,)`` what sensors and tyres feel, see ``ego/_weather_kernels``.
         transitions: ``(2,)`` int64, when the ego left its domain, see ``drivers/_odd_kernels``.
+        shoulder: ``(4,)`` the shift by which it comes to stand on the shoulder, see
+            ``_path_kernels``; zeros: it does not.
         ending: ``(4,)`` int64: recorded instants, 0 while it runs; status; whether it stops now;
             how many transitions there were.
         observed: ``(P,)`` bool, what the probes see.
@@ -278,6 +280,7 @@ class State(NamedTuple):
     slots: Annotated[Float, "slots"]
     weather: Annotated[Float, "weather"]
     transitions: Annotated[Int, 2]
+    shoulder: Annotated[Float, 4]
     ending: Annotated[Int, 4]
     observed: Annotated[Bool, "probes"]
     history: Annotated[Bool, "conditions", "instants"]

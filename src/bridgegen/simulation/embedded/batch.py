@@ -18,7 +18,7 @@ from bridgegen.drivers._surroundings_kernels import AROUND
 from bridgegen.drivers._tracking_kernels import TRACK
 from bridgegen.drivers._weather_columns import FRICTION, WEATHER
 from bridgegen.drivers.compiled import CONFLICT
-from bridgegen.drivers.drivers import DEMAND, SCRIPTED, STAGES, STORYBOARD, TESTED
+from bridgegen.drivers.drivers import DEMAND, MANOEUVRES, SCRIPTED, STAGES, STORYBOARD, TESTED
 from bridgegen.drivers.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.drivers.kinds import DETECTION, NEEDS_ROOM
 from bridgegen.drivers.lane_tables import STRAYS
@@ -438,7 +438,7 @@ def _plan(program: Program, until_collision: bool) -> memory.Plan:
         "comes_and_goes": int(program.comes_and_goes),
         "leaves": int(program.leaves),
         "scene": _scene(program),
-        "stops_in_lane": int(program.driver.stops_in_lane),
+        "stops_in_lane": ["", *MANOEUVRES].index(program.driver.manoeuvre),
         "attends": int(program.attends.size > 0),
         "begins": np.zeros(len(program.actions), dtype=np.int64),
         "follows_courses": 0,

@@ -390,7 +390,7 @@ class Program:
     @property
     def switches_lamps(self) -> bool:
         """Whether an action, or the ego's driver, switches indicators or brake lights."""
-        stops = self.driver.stops_in_lane and len(self.limits) > 0
+        stops = self.driver.manoeuvre and len(self.limits) > 0
         return bool(stops or (self.actions[:, DOES] == SWITCH).any())
 
     @property

@@ -13,7 +13,7 @@ from bridgegen.base.arrays import Int
 from bridgegen.base.errors import InputError, UnknownNameError, UnsupportedError
 from bridgegen.drivers import DRIVERS, GUESTS, STORYBOARD, Driver, get, is_planner, is_spec, split
 from bridgegen.drivers import _tracking_kernels as tracking
-from bridgegen.drivers.drivers import CODES, STOP_IN_LANE
+from bridgegen.drivers.drivers import CODES, manoeuvre_of
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
@@ -95,7 +95,7 @@ def driver(controllers: Controllers, place: str) -> Driver:
                     f"{place}, line {controller.line}: the ego is driven by '{name}', "
                     f"which is code; to run it, name it: --ego {shlex.quote(str(name))}"
                 )
-            plain = str(name).removesuffix(STOP_IN_LANE)
+            plain = str(name).removesuffix(manoeuvre_of(str(name)))
             if str(name) not in GUESTS and plain not in DRIVERS and not is_planner(str(name)):
                 raise UnsupportedError(
                     f"{place}, line {controller.line}: unknown ego driver '{name}'; "
