@@ -5,7 +5,7 @@ from typing import Any
 
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.scenario.language.roads import LegSpec, RoadsSpec, Segment, usual
+from bridgegen.scenario.language.roads import Change, LegSpec, RoadsSpec, Segment, usual
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.individuals import build_static
 from bridgegen.scenario.ontology.site import Facility
@@ -42,6 +42,10 @@ KINDS: dict[str, RoadsSpec] = {
     "straight": usual("road", lanes=3, lanes_against=1, shoulder_width=1.5, sidewalk_width=2.0),
     "one-way": usual("road", lanes=2, length=1000.0, speed_limit=33.3),
     "downhill": usual("road", lanes=2, lanes_against=1, grade=-0.06),
+    "changing": replace(
+        usual("road", lanes=2, lanes_against=1, shoulder_width=2.0),
+        change=Change(150.0, "rural", "none"),
+    ),
     "curved": replace(
         usual("road", lanes=2, lanes_against=2),
         segments=(

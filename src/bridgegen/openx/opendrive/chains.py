@@ -15,9 +15,7 @@ from bridgegen.openx.opendrive.lanes import section_end, values
 from bridgegen.openx.opendrive.legs import leads_to
 from bridgegen.openx.opendrive.model import LaneSection, OpenDrive, Road
 from bridgegen.scenario.ontology.site import ArmRoad, Direction, JunctionEnd, LaneType, SiteLane
-
-ROAD_TYPES = ("town", "rural", "motorway")
-"""Types of road that a scenario distinguishes."""
+from bridgegen.scenario.weather import ROAD_TYPES
 
 _STRIPS: dict[str, LaneType] = {
     "shoulder": "shoulder",

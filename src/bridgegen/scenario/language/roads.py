@@ -5,10 +5,10 @@ name of a parameter of the static axis; without a word about it, a static parame
 own name, or else the template's usual value.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from bridgegen.scenario.language.parameters import Axis, Derived, Parameter, nearest
 
@@ -151,23 +151,18 @@ class Segment:
     end_curvature: Quantity
 
 
-@dataclass(frozen=True)
-class Change:
-    """What of a road is different from a place on.
+class Change(NamedTuple):
+    """What of a road is different from a place on; "" is as before.
 
     Attributes:
         at: the place, from the road's start [m].
-        road_type: its class from there on; "": as before.
-        markings: how its lanes are marked from there on; "": as before.
+        road_type: its class from there on.
+        markings: how its lanes are marked from there on.
     """
 
     at: Quantity
     road_type: RoadType | Literal[""] = ""
     markings: Literal["none", ""] = ""
-
-    def placed(self, measure: Callable[[Quantity], float]) -> tuple[float, str, str]:
-        """Return it with a number in place of a parameter's name."""
-        return measure(self.at), self.road_type, self.markings
 
 
 @dataclass(frozen=True)

@@ -159,7 +159,7 @@ class _Template:
         said: dict[Direction, float] = {
             way: count for way, count in counts.items() if isinstance(count, Searched)
         }
-        change = self.roads.change and self.roads.change.placed(self.measure)
+        change = self.roads.change
         return ArmRoad(
             road_id=road_id,
             length=length,
@@ -169,7 +169,7 @@ class _Template:
             road_type=self.roads.road_type,
             segments=segments,
             grade=self.knobs.get("grade", 0.0),
-            change=change,
+            change=change and (self.measure(change.at), *change[1:]),
             counts=said,
             closes={name: self.measure(limit) for name, limit in self.roads.closes.items()},
         )

@@ -24,6 +24,7 @@ from bridgegen.openx.opendrive.user_data import number, values_of
 from bridgegen.scenario.ontology.builder import Builder
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import tbox
+from bridgegen.scenario.weather import ROAD_TYPES
 
 # --- OpenDRIVE2OWL, its junctions: what they are, which roads meet there, and the ways across ---
 
@@ -227,6 +228,8 @@ class _Map(Builder):
             self.put(node, "has_speed_limit", limit)
         if road.types and road.types[0].type in self.known_types:
             self.put(node, "has_road_type", road.types[0].type)
+        for name, later in _change(road):
+            self.put(node, name, later)
         for name in _CLOSES:
             above = number(road.user_data, name)
             if above is not None:
@@ -364,6 +367,22 @@ def _middle_width(road: Road, index: int, lane: Lane) -> float:
 def has_width(road: Road, index: int, lane: Lane) -> bool:
     """Return whether a lane is wider than 0 m halfway along its section."""
     return _middle_width(road, index, lane) > 0.0
+
+
+def _change(road: Road) -> list[tuple[str, float | str]]:
+    """Return what is stated of the one place from which on a road has another type or no marks."""
+    types = road.types[1:]
+    lanes = [lane for section in road.sections for lane in (*section.center, *section.lanes)]
+    marks = [mark for lane in lanes for mark in lane.road_marks if mark.s > 0.0]
+    places = {each.s for each in (*types, *marks)}
+    known = {kind.type for kind in types} <= {*ROAD_TYPES} and {m.type for m in marks} <= {"none"}
+    if len(road.sections) > 1 or len(places) != 1 or not known:
+        return []
+    return [
+        ("has_change_at", float(places.pop())),
+        *(("has_later_road_type", kind.type) for kind in types),
+        *(("has_later_marking_type", mark.type) for mark in marks[:1]),
+    ]
 
 
 def _speed_limit(road: Road) -> float | None:
