@@ -374,7 +374,7 @@ def _change(road: Road) -> list[tuple[str, float | str]]:
     types = road.types[1:]
     lanes = [lane for section in road.sections for lane in (*section.center, *section.lanes)]
     marks = [mark for lane in lanes for mark in lane.road_marks if mark.s > 0.0]
-    places = {each.s for each in (*types, *marks)}
+    places = {kind.s for kind in types} | {mark.s for mark in marks}
     known = {kind.type for kind in types} <= {*ROAD_TYPES} and {m.type for m in marks} <= {"none"}
     if len(road.sections) > 1 or len(places) != 1 or not known:
         return []
