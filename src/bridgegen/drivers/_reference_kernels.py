@@ -170,7 +170,8 @@ def drive(k, plan_, roads, state, record):
     )  # fmt: skip
     haunt(k, plan_, roads, state, record)
     if state.shoulder[SHOULDER_LENGTH] > 0.0:  # it plans for where it will be
-        mind[BEFORE : BEFORE + 4] = state.shoulder
+        for i in range(4):  # a slice would be copied first
+            mind[BEFORE + i] = state.shoulder[i]
     # By time, not by instants: so it plans as often at any step up to `CYCLE`.
     if k * plan_.dt > mind[NEXT_PLAN] - 1e-6:
         mind[NEXT_PLAN] += max(CYCLE, plan_.dt)
