@@ -160,7 +160,7 @@ class Rate(_Model):
     def sentence(self) -> str:
         """In words, with what it is a probability of."""
         if self.source:
-            of = f"per encounter, by the exposure: {self.source}"
+            of = f"per encounter, by the exposure: {self.source.rstrip('.')}"
         else:
             even = "weather as it is met, all else uniform" if self.met else "uniform"
             of = f"of the ranges ({even}; not a rate on roads: no exposure is given)"
