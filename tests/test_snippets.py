@@ -126,6 +126,8 @@ def shortened(words: list[str], is_triaged: bool = False) -> list[str]:
     if words[1] == "search" and any(".py:" in word or word == "--adversary" for word in words):
         # A driver in Python, or a course for each row, takes its time.
         short |= {"--budget": "40", "--triage": "none"}
+    if "--catalogue" in words:
+        short |= {"--budget": "8", "--triage": "none"}  # in each of its scenarios
     found = list(words)
     for option, value in FEW.get(words[1], {}).items():
         if option in found:

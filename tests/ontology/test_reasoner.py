@@ -58,14 +58,6 @@ def test_the_ontology_is_consistent_and_every_class_can_have_individuals():
 
 
 @reasoning
-@pytest.mark.parametrize("name", covering())
-def test_every_scenario_of_the_catalogue_is_consistent(name):
-    scenario = load(name)
-    values = scenario.space().values(scenario.space().row({}))
-    assert reason(build(scenario, values, driver="reference")).contradiction == ()
-
-
-@reasoning
 @pytest.mark.parametrize("name", [f"crossroads-s{k}" for k in range(1, 5)])
 def test_saved_scenarios_are_consistent(name, tmp_path):
     scenario = load(name)
