@@ -15,6 +15,7 @@ ROUND = {
     "exit-reactions": (("perceiving",), 1),
     "follower-closes-in": (("all ideal",), 1),
     "jam-tail-in-fog": (("all ideal",), 1),
+    "markings-end": (("perceiving",), 1),
     "object-on-road": (IDEAL, 1),
     "wrong-way-driver": (("perceiving",), -1),
 }

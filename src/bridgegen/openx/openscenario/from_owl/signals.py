@@ -34,6 +34,9 @@ LINKS = {
 }
 """The state of the lights that a phase names by each of its properties; all others are red."""
 
+PASSED = "_passed"
+"""End of the name of the part of a phase that has passed before time 0; it ends the cycle."""
+
 _MOST_CHANGES = 200
 
 
@@ -102,22 +105,25 @@ class Signals:
             self.offsets[name] = offset
         # The standard's cycle begins with its first phase, in full: with what is left of the one
         # that runs at time 0, whose passed part ends the cycle.
-        parts = [(k, durations[k]) for k in (*range(first, len(phases)), *range(first))]
+        order = (*range(first, len(phases)), *range(first))
+        parts = [(k, ind.text(phases[k], "has_name"), durations[k]) for k in order]
         if offset > 0.0:
-            parts = [(first, durations[first] - offset), *parts[1:], (first, offset)]
+            _, said, lasts = parts[0]
+            rest = (first, said, lasts - offset)
+            parts = [rest, *parts[1:], (first, said + PASSED, offset)]
         self.controllers.append(
             osc.TrafficSignalController(
                 name,
                 tuple(
                     osc.Phase(
-                        ind.text(phases[k], "has_name"),
+                        said,
                         lasts,
                         tuple(
                             osc.TrafficSignalState(light, LAMPS[state])
                             for light, state in sorted(shown[k].items())
                         ),
                     )
-                    for k, lasts in parts
+                    for k, said, lasts in parts
                 ),
             )
         )

@@ -31,7 +31,7 @@ from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, SIGNALS
 from bridgegen.openx.openscenario.from_owl.scenario import ARRIVAL, openscenario_from_owl
-from bridgegen.openx.openscenario.from_owl.signals import LINKS, Signals
+from bridgegen.openx.openscenario.from_owl.signals import LINKS, PASSED, Signals
 from bridgegen.openx.openscenario.parameters import EGO
 from bridgegen.openx.openscenario.read import fragment_of
 from bridgegen.openx.openscenario.resolve import part_resolved
@@ -114,7 +114,7 @@ def _add_controller(
     parts = [(phase, builder.now(phase.duration, phase)) for phase in controller.phases]
     (first, lasts), (last, ended) = parts[0], parts[-1]
     # The phase that runs at time 0 is in two parts; files of earlier versions have it whole.
-    if 0.0 < offset == ended and builder.text(first.name) == builder.text(last.name):
+    if 0.0 < offset == ended and builder.text(last.name) == builder.text(first.name) + PASSED:
         parts = [(first, lasts + offset), *parts[1:-1]]
     shown = [
         {builder.text(state.traffic_signal_id): state for state in phase.traffic_signal_states}
