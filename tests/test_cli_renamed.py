@@ -8,8 +8,9 @@ from bridgegen.cli import app
 from bridgegen.cli.groups import PANELS, RENAMED
 
 SEEN = (
-    "demo search resume suite diff benchmark preventability risk open analyse confirm export "
-    "dashboard safety-case credibility new validate draw simulate mine fit list ontology doctor"
+    "demo search resume suite diff repair benchmark preventability risk open analyse confirm "
+    "export dashboard safety-case credibility new validate draw simulate mine fit list ontology "
+    "doctor"
 )
 
 

@@ -31,14 +31,15 @@ GIVEN = {
         "files": ("cut-in", "packs"), "egos": ("careful", "exec:python3 my,driver.py"),
         "matrix": "2026", "samples": 3, "seed": 4, "simulator": SimulatorChoice("esmini"),
         "driver_name": "planner 7", "with_maps": True, "assessor": Path("/keys/a.key"),
+        "repeats": 5,
     },
     "diff": {
         "files": ("cut-in",), "egos": ("careful", "reference"), "matrix": "none", "samples": 3,
-        "seed": 4, "budget": 0,
+        "seed": 4, "budget": 0, "repeats": 5,
     },
     "repair": {
         "files": ("cut-in",), "egos": ("careful",), "matrix": "none", "samples": 3, "seed": 4,
-        "budget": 5, "rounds": 2, "tries": 7,
+        "budget": 5, "rounds": 2, "tries": 7, "repeats": 5,
     },
     "dashboard": {
         "folder": Path("project"), "criteria": ["R-1: min(ego.v) < 3 m/s"], "update": True,

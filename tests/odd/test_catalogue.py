@@ -302,8 +302,9 @@ def test_the_traffic_of_random_rows_drives_as_drivers_do(name, ego):
         assert (rollout.status == 0).all()
         assert set(plausibility(rollout).labels) == {""}
         dt = rollout.time_step
+        drives = {view.names[0] for view in (rollout, *rollout.egos)}  # whom the ego's driver drives
         for i, e in np.ndindex(rollout.shape[0], rollout.shape[1]):
-            if e == 0 or rollout.kinds[e] in (PEDESTRIAN, ANIMAL, OTHER):
+            if rollout.names[e] in drives or rollout.kinds[e] in (PEDESTRIAN, ANIMAL, OTHER):
                 continue
             touched = np.flatnonzero((rollout.distance[i, 1:] <= 0.0).any(axis=0))
             end = int(min([*touched[:1].tolist(), rollout.n_steps[i]]))

