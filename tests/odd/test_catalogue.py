@@ -302,7 +302,8 @@ def test_the_traffic_of_random_rows_drives_as_drivers_do(name, ego):
         assert (rollout.status == 0).all()
         assert set(plausibility(rollout).labels) == {""}
         dt = rollout.time_step
-        drives = {view.names[0] for view in (rollout, *rollout.egos)}  # whom the ego's driver drives
+        # Whom the ego's driver drives.
+        drives = {view.names[0] for view in (rollout, *rollout.egos)}
         for i, e in np.ndindex(rollout.shape[0], rollout.shape[1]):
             if rollout.names[e] in drives or rollout.kinds[e] in (PEDESTRIAN, ANIMAL, OTHER):
                 continue

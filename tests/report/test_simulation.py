@@ -205,7 +205,8 @@ def test_the_catalogue_is_simulated_in_pages_but_for_a_reason():
     refused = {name: one["refused"] for name, one in found.items() if "refused" in one}
     storyboards = "its scenarios differ in the storyboard, not in numbers alone"
     # A participant of some starts at one place or another.
-    assert refused.keys() == {"cyclist-crosses", "merge-ego", "merges-at-works", "two-at-crossroads"}
+    names = {"cyclist-crosses", "merge-ego", "merges-at-works", "two-at-crossroads"}
+    assert refused.keys() == names
     assert refused["cyclist-crosses"] == refused["merge-ego"] == storyboards
     assert refused["merges-at-works"].startswith("its road network takes ")
     assert refused["two-at-crossroads"] == "the ego's driver drives several vehicles"
