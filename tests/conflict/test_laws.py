@@ -77,7 +77,7 @@ def around(seed):
 
 def same(a: Conflicts, b: Conflicts, but=(), tolerance=0.0):
     for field in fields(Conflicts):
-        if field.name in ("names", "time_step", "left_hand", "country", *but):
+        if field.name in ("names", "time_step", "left_hand", "country", "driven", *but):
             continue
         one, other = getattr(a, field.name), getattr(b, field.name)
         if one.dtype.kind in "ib" or tolerance == 0.0:
@@ -91,7 +91,7 @@ def alike(a: Conflicts, b: Conflicts, but=(), share=0.95):
     agree = np.ones(a.kind.shape, np.bool_)
     for field in fields(Conflicts):
         one, other = getattr(a, field.name), getattr(b, field.name)
-        if field.name in ("names", "time_step", "left_hand", "country", "ok", *but):
+        if field.name in ("names", "time_step", "left_hand", "country", "driven", "ok", *but):
             continue
         agree &= (one == other) if one.dtype.kind in "ib" else np.isclose(one, other, atol=1e-5)
     assert agree.mean() >= share
@@ -215,7 +215,7 @@ def test_a_rows_result_depends_on_that_row_alone(seed):
                  "present")  # fmt: skip
         alone = analyse(replace(rollout, **{n: getattr(rollout, n)[i : i + 1] for n in names}))
         for field in fields(Conflicts):
-            if field.name not in ("names", "time_step", "left_hand", "country"):
+            if field.name not in ("names", "time_step", "left_hand", "country", "driven"):
                 np.testing.assert_array_equal(
                     getattr(whole, field.name)[i], getattr(alone, field.name)[0], field.name
                 )
@@ -238,7 +238,7 @@ def test_the_order_of_the_others_does_not_matter(seed):
     )
     one, other = analyse(rollout), analyse(shuffled)
     for field in fields(Conflicts):
-        if field.name not in ("names", "time_step", "left_hand", "country", "ok"):
+        if field.name not in ("names", "time_step", "left_hand", "country", "driven", "ok"):
             np.testing.assert_array_equal(
                 getattr(one, field.name)[:, order], getattr(other, field.name), field.name
             )

@@ -19,10 +19,10 @@ class Poisoned(Pipeline):
         made_with = {"options": self._options, "recorded": self.metrics, **self._made_with}
         return Recipe.of(_poisoned, self.poison, **made_with)
 
-    def evaluate_rows(self, X, objective):
+    def evaluate_rows(self, X, objective, repeat=0):
         if (self.poison == X).all(axis=1).any():
             os.kill(os.getpid(), signal.SIGSEGV)
-        return super().evaluate_rows(X, objective)
+        return super().evaluate_rows(X, objective, repeat)
 
 
 def _poisoned(poison: np.ndarray, **made_with) -> Poisoned:
