@@ -86,14 +86,14 @@ def test_a_participants_own_driver_goes_before_that_of_all(tmp_path):
         (
             "    speed: bv_speed\n",
             "    speed: bv_speed\n    driver: attentiv\n",
-            "the driver of bv must be one of attentive, insistent, lawful, scripted, ego (others are "
-            "for the ego), got 'attentiv'; did you mean 'attentive'?",
+            "the driver of bv must be one of attentive, insistent, lawful, scripted, ego (others "
+            "are for the ego), got 'attentiv'; did you mean 'attentive'?",
         ),
         (
             "    speed: bv_speed\n",
             "    speed: bv_speed\n    driver: reference\n",
-            "the driver of bv must be one of attentive, insistent, lawful, scripted, ego (others are "
-            "for the ego), got 'reference'",
+            "the driver of bv must be one of attentive, insistent, lawful, scripted, ego (others "
+            "are for the ego), got 'reference'",
         ),
         (
             "    speed: ego_speed\n",
