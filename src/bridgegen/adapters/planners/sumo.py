@@ -9,9 +9,9 @@ while it changes lane. So the model also follows what is ahead on the lane that 
 leaving, and bodies that reach into the ego's lane from another one or from beside the road. At a
 red light, and at a yellow one if it can, it is asked for its speed to stop.
 
-All settings are SUMO's own, but random numbers are off (``sigma``, ``speedDev`` and EIDM's errors
-are 0), so that a row depends on that row alone. What crosses the road is a vehicle on it only while
-it is there; oncoming ones stand.
+All settings are SUMO's own, unless others are given (``tunable``), but random numbers are off
+(``sigma``, ``speedDev`` and EIDM's errors are 0), so that a row depends on that row alone. What
+crosses the road is a vehicle on it only while it is there; oncoming ones stand.
 
 CACC needs a leader that is a CACC vehicle and sends its acceleration; no other participant is one.
 So it keeps its desired speed above a time gap of 2 s, follows by ACC's law (headway 1 s) below
@@ -31,15 +31,23 @@ Modeling of Traffic Flow, DLR-FB 98-08, 1998; Salles, Kaufmann, Reuss, SUMO Conf
 EIDM; Milanés, Shladover, Transp. Res. C 48 (2014) 285, ACC and CACC; Erdmann, LC2013, 2014.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
+from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 
 from bridgegen.adapters.planners._corridor import Corridor
 from bridgegen.adapters.planners._sumo_road import Arrays, Eyes, Seen, StraightRoad, network_text
 from bridgegen.adapters.planners._sumo_script import SCRIPT
-from bridgegen.adapters.planners._sumo_simulation import MODELS, Simulation, types_text
+from bridgegen.adapters.planners._sumo_simulation import (
+    MODELS,
+    OF_ALL,
+    OF_EIDM,
+    Simulation,
+    types_text,
+)
 from bridgegen.base.physics import GRAVITY
 from bridgegen.drivers._path_kernels import aside_at, shift_length
 from bridgegen.drivers._route_follower_kernels import preview
@@ -72,6 +80,8 @@ class SumoDriver:
     """
 
     wants = ("map",)
+    tunable: ClassVar = OF_ALL
+    settings: Mapping[str, float] = MappingProxyType({})
     model: str
 
     def __init__(self) -> None:
@@ -90,7 +100,11 @@ class SumoDriver:
         self._roads = [roads[k] for k in scene.map_of[:n]]
         self._eyes = [Eyes(road, scene) for road in self._roads]
         self._simulation = Simulation(
-            self.model, network_text(self._roads), [len(item.lanes) for item in self._roads], scene
+            self.model,
+            network_text(self._roads),
+            [len(item.lanes) for item in self._roads],
+            scene,
+            self.settings,
         )
         self._rows = [Row(road) for road in self._roads]
 
@@ -122,6 +136,7 @@ class KraussDriver(SumoDriver):
 class EIDMDriver(SumoDriver):
     """Drives by SUMO's EIDM."""
 
+    tunable: ClassVar = OF_ALL | OF_EIDM
     model = "EIDM"
 
 
@@ -197,7 +212,7 @@ def export(observations: Sequence[Observation], scene: Scene) -> Arrays:
     seen = [eyes.see(observation, 0) for observation in observations]
     return {
         "network": np.array(network_text([road])),
-        "types": np.array(types_text(scene.length, scene.width)),
+        "types": np.array(types_text(scene.length, scene.width, {})),
         "route": np.array(" ".join(f"r0e{k}" for k in range(len(road.lanes)))),
         "time_step": np.array(scene.time_step),
         "lanes": road.lanes,
