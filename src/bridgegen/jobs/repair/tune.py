@@ -10,6 +10,7 @@ with what passes as a constraint; CMA-ES: Hansen (2016), arXiv:1604.00772.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from bridgegen.engine.workers import Lost, Threads
 from bridgegen.search.algorithms.cma_es import reflected
 from bridgegen.search.triage.moves import around
 from bridgegen.search.triage.neighbours import NEIGHBOURS, RADIUS, ROBUST
+
+if TYPE_CHECKING:
+    from cmaes import CMA
 
 HARM, CHANGE, BROKEN = 0.5, 0.1, 10.0
 """Weights in the cost of settings, beside the share of rows that they do not mend: of the mean harm
@@ -258,7 +262,8 @@ class Bench:
         """Return the best settings that keep the constraints; the present ones if none are better.
 
         First the least and the greatest value of each number alone; then CMA-ES from the best on;
-        then numbers are put back that mend nothing. The best are checked: see `choose`.
+        then numbers are put back that mend nothing. The best are checked (see `choose`); where
+        that refutes some, CMA-ES begins again with half as many tries.
 
         Args:
             start: settings of an earlier round.
@@ -277,11 +282,19 @@ class Bench:
         best = self.trial(base)
         for values in first[1:]:
             best = min(best, self.trial(values, best.cost), key=lambda trial: trial.rank)
-        # Of one number CMA has no covariance: a second one, which stands for nothing, gives it one.
-        mean = np.append(self.unit(best.values), [0.5] * (n == 1))
+        left, refuted = tries - len(first), -1
         random = np.random.Generator(np.random.PCG64(seed))
-        search = CMA(mean, STEP, seed=int(random.integers(2**32)))
-        left, stalled = tries - len(first), 0
+        while left > 0 and refuted < len(self._refuted):
+            refuted = len(self._refuted)
+            # Of one number CMA has no covariance: a second one, of no meaning, gives it one.
+            mean = np.append(self.unit(best.values), [0.5] * (n == 1))
+            self._search(CMA(mean, STEP, seed=int(random.integers(2**32))), best, left)
+            best, left = self.choose(), left // 2  # what was refuted is infeasible now
+        return best
+
+    def _search(self, search: "CMA", best: Trial, left: int) -> None:
+        """Try settings by CMA-ES, then the best with numbers as they were."""
+        n, stalled = len(self.tunable), 0
         while left >= search.population_size and not search.should_stop():
             drawn = [search.ask() for _ in range(search.population_size)]
             before, limit = best, best.cost
@@ -293,7 +306,6 @@ class Bench:
             if stalled >= STALLED and best.mends.all():
                 break
         self._put_back(best)
-        return self.choose()
 
     def _put_back(self, best: Trial) -> Trial:
         """Try each number of settings as it was, the least changed first."""
