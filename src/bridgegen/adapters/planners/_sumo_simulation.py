@@ -32,7 +32,11 @@ MIN_GAP = 2.5
 EMERGENCY = 9.0
 """Largest deceleration of passenger cars [m/s²]; SUMO's ``emergencyDecel``."""
 
-OF_ALL: dict[str, tuple[float | str, ...]] = {
+Settings = Mapping[str, float]
+
+Numbers = dict[str, tuple[float | str, ...]]
+
+OF_ALL: Numbers = {
     "tau": (1.0, 0.5, 3.0, "s"),
     "minGap": (MIN_GAP, 1.0, 6.0, "m"),
     "accel": (2.6, 1.0, 3.5, "m/s²"),
@@ -42,7 +46,7 @@ OF_ALL: dict[str, tuple[float | str, ...]] = {
 """The numbers of a vehicle type that may be set, by SUMO's names: its defaults for passenger cars,
 and ranges, which SUMO does not state: these are ours."""
 
-OF_EIDM: dict[str, tuple[float | str, ...]] = {
+OF_EIDM: Numbers = {
     "tpreview": (4.0, 1.0, 8.0, "s"),
     "treaction": (0.5, 0.0, 1.5, "s"),
     "ccoolness": (0.99, 0.0, 1.0),
@@ -67,12 +71,7 @@ class Simulation:
     """
 
     def __init__(
-        self,
-        model: str,
-        network: str,
-        edges: Sequence[int],
-        scene: Scene,
-        settings: Mapping[str, float],
+        self, model: str, network: str, edges: Sequence[int], scene: Scene, settings: Settings
     ) -> None:
         import libsumo
 
@@ -182,7 +181,7 @@ def _lane(r: int, edge: int, lane: int, lanes: Int) -> str:
     return f"r{r}e{edge}_{int(lanes[edge]) - 1 - lane}"
 
 
-def types_text(length: float, width: float, settings: Mapping[str, float]) -> str:
+def types_text(length: float, width: float, settings: Settings) -> str:
     """Return the vehicle types, as the text of an additional file of SUMO.
 
     Args:

@@ -31,23 +31,18 @@ Modeling of Traffic Flow, DLR-FB 98-08, 1998; Salles, Kaufmann, Reuss, SUMO Conf
 EIDM; Milanés, Shladover, Transp. Res. C 48 (2014) 285, ACC and CACC; Erdmann, LC2013, 2014.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
 
+from bridgegen.adapters.planners import _sumo_simulation as simulation
 from bridgegen.adapters.planners._corridor import Corridor
 from bridgegen.adapters.planners._sumo_road import Arrays, Eyes, Seen, StraightRoad, network_text
 from bridgegen.adapters.planners._sumo_script import SCRIPT
-from bridgegen.adapters.planners._sumo_simulation import (
-    MODELS,
-    OF_ALL,
-    OF_EIDM,
-    Simulation,
-    types_text,
-)
+from bridgegen.adapters.planners._sumo_simulation import MODELS, Simulation, types_text
 from bridgegen.base.physics import GRAVITY
 from bridgegen.drivers._path_kernels import aside_at, shift_length
 from bridgegen.drivers._route_follower_kernels import preview
@@ -80,8 +75,8 @@ class SumoDriver:
     """
 
     wants = ("map",)
-    tunable: ClassVar = OF_ALL
-    settings: Mapping[str, float] = MappingProxyType({})
+    tunable: ClassVar = simulation.OF_ALL
+    settings: simulation.Settings = MappingProxyType({})
     model: str
 
     def __init__(self) -> None:
@@ -99,13 +94,8 @@ class SumoDriver:
         roads = [StraightRoad(Corridor(road)) for road in scene.maps]
         self._roads = [roads[k] for k in scene.map_of[:n]]
         self._eyes = [Eyes(road, scene) for road in self._roads]
-        self._simulation = Simulation(
-            self.model,
-            network_text(self._roads),
-            [len(item.lanes) for item in self._roads],
-            scene,
-            self.settings,
-        )
+        edges, network = [len(item.lanes) for item in self._roads], network_text(self._roads)
+        self._simulation = Simulation(self.model, network, edges, scene, self.settings)
         self._rows = [Row(road) for road in self._roads]
 
     def act(self, observation: Observation) -> Control:
@@ -136,7 +126,7 @@ class KraussDriver(SumoDriver):
 class EIDMDriver(SumoDriver):
     """Drives by SUMO's EIDM."""
 
-    tunable: ClassVar = OF_ALL | OF_EIDM
+    tunable: ClassVar = simulation.OF_ALL | simulation.OF_EIDM
     model = "EIDM"
 
 

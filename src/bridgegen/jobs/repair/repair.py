@@ -295,10 +295,8 @@ class _Repairer:
             sought = len(bench.failing.X)
             given.callbacks.stage(f"settings, round {number + 1}")
             best = bench.tune(values, given.tries, [given.seed, _STREAM, number])
-            # Every search finds the failures again that no numbers mend: these are no reason to go
-            # on.
-            is_more = best.mends.sum() > bench.trial(values, -1.0).mends.sum()
-            if not (is_more or is_refuted):
+            # Every search finds the failures again that no numbers mend: no reason to go on.
+            if not is_refuted and best.mends.sum() <= bench.trial(values, -1.0).mends.sum():
                 break
             values = best.values
             if values == self.old:
@@ -339,8 +337,7 @@ class _Repairer:
             wanted = [*(i for mode in modes for i in mode.examples[:3]), *others]
             parts.append(rows.X[[*dict.fromkeys(wanted)][:MOST_FAILING]])
         found = Rows.of(parts)
-        at = np.flatnonzero(self.bench.drive(found, values)[:, FAILS])
-        return Rows(tuple(found.X[i] for i in at), found.scene[at])
+        return found.at(np.flatnonzero(self.bench.drive(found, values)[:, FAILS]))
 
     def _begin(self, runs: Sequence[Run], failing: Rows) -> Rows:
         """Draw rows, choose those that must still pass; return all failing ones."""
@@ -360,9 +357,7 @@ class _Repairer:
             X = found.X[np.sort(at[:NEAREST_OF])]
             fails = [x for x, k in zip(failing.X, failing.scene, strict=True) if k == scene]
             if fails and len(X):
-                places, to = (
-                    searched(space, rows) / ranges(space) for rows in (X, np.stack(fails))
-                )
+                places, to = (searched(space, at) / ranges(space) for at in (X, np.stack(fails)))
                 far = np.min([np.square(places - place).sum(axis=1) for place in to], axis=0)
                 X = X[np.sort(np.argsort(far, kind="stable")[:GUARDS])]
             passed.append(X[:GUARDS])

@@ -179,27 +179,22 @@ class Bench:
             at = np.flatnonzero(rows.scene == scene)
             X, pipeline = np.stack([rows.X[i] for i in at]), self.pipelines[scene]
             parts = self._workers.map(pipeline, drive, X, settings)
-            none = [np.zeros((part.rows, 6)) for part in parts]
+            lost = [isinstance(part.result, Lost) for part in parts]
+            each = zip(parts, lost, strict=True)
             found[at] = np.concatenate(
-                [
-                    a if isinstance(p.result, Lost) else p.result
-                    for p, a in zip(parts, none, strict=True)
-                ]
+                [np.zeros((p.rows, 6)) if no else p.result for p, no in each]
             )
         return found
 
     def draw(self, drawn: Rows) -> None:
-        """Take random rows, on which settings are checked, and the first of them also tried.
-
-        Jerk and travel time are measured on those that pass.
-        """
+        """Take random rows: settings, their jerk and travel time are checked on them."""
         self.drawn, self._base = drawn, self.drive(drawn, self.base)
 
     def drawn_that(self, column: int, most: int) -> Rows:
         """Return the first drawn rows of each scenario that pass or fail."""
         that, scene = self._base[:, column] > 0.0, self.drawn.scene
         at = [np.flatnonzero(that & (scene == k))[:most] for k in range(len(self.pipelines))]
-        return self.drawn.at(np.concatenate(at) if at else np.zeros(0, np.int64))
+        return self.drawn.at(np.concatenate(at))
 
     def guard(self, drawn: Rows, found: Rows = NONE) -> None:
         """Add rows that must still pass: drawn ones, and those of others that pass."""
@@ -272,7 +267,7 @@ class Bench:
         """
         from cmaes import CMA  # loads a part of SciPy
 
-        base, n, self._sought = self.base, len(self.tunable), len(self.failing.X)
+        base, self._sought = self.base, len(self.failing.X)
         ends = [
             (*base[:k], end, *base[k + 1 :])
             for k, item in enumerate(self.tunable)
@@ -287,7 +282,7 @@ class Bench:
         while left > 0 and refuted < len(self._refuted):
             refuted = len(self._refuted)
             # Of one number CMA has no covariance: a second one, of no meaning, gives it one.
-            mean = np.append(self.unit(best.values), [0.5] * (n == 1))
+            mean = np.append(self.unit(best.values), [0.5] * (len(self.tunable) == 1))
             self._search(CMA(mean, STEP, seed=int(random.integers(2**32))), best, left)
             best, left = self.choose(), left // 2  # what was refuted is infeasible now
         return best
