@@ -77,14 +77,17 @@ def _typologies(scenarios: Sequence[str]) -> Listed:
 @_of("packs")
 def _packs() -> Listed:
     """Logical scenarios of the packs, with their clauses."""
-    from bridgegen.scenario.language.reader import load, pack_names, pack_tables
+    from bridgegen.scenario.language.reader import document_of, names, pack_names, pack_tables
 
-    made = [(name, load(name)) for name in pack_names()]
-    rows = [(name, it.title, ", ".join(each.id for each in it.clauses)) for name, it in made]
+    files = {name: document_of(name)[0].data for name in (*names(), *pack_names())}
+    rows = []
+    for name in pack_names():
+        ids = ", ".join(clause["id"] for clause in files[name].get("clauses", []))
+        rows.append((name, files[name]["title"], ids))
     for pack, table in pack_tables().items():
         for entry, (scenario, keys) in table.entries.items():
             ids = ", ".join(map(table.id_of, keys))
-            rows.append((f"{pack}/{entry}", load(scenario).title, ids))
+            rows.append((f"{pack}/{entry}", files[scenario]["title"], ids))
         rows += [(f"{pack}: not answered", text, id) for id, text, _ in table.unanswered]
     return ("scenario", "title", "clauses"), rows
 
