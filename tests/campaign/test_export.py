@@ -23,6 +23,8 @@ from bridgegen.openx.openscenario.element import references, walk
 from bridgegen.openx.openscenario.read import read
 from bridgegen.scenario.language.reader import load
 
+pytestmark = pytest.mark.thorough
+
 SCHEMAS = {
     "1.2": "1.2.0",
     "1.3": "1.3.0",
