@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from bridgegen.jobs.repair.repair import repair_driver
 from bridgegen.jobs.repair.tune import CHANGES, FAILS, PASSES, TIME, WAY, WORST, Bench, Rows
 from bridgegen.jobs.search import Run
 from bridgegen.jobs.search.scenarios import load
+from bridgegen.jobs.suite.difference import Difference, RowChange
 
 DRIVERS = Path(__file__).with_name("drivers.py")
 OWN = f"{DRIVERS}:BrakesTooLittle"
@@ -182,6 +184,23 @@ def test_a_patch_needs_the_support_of_held_out_variations(fixed, broken, robust,
     counts = {"fixed": fixed, "broken": broken, "robust": robust, "both fail": both_fail}
     why = repair._refused(counts, 61)
     assert (said in why) if said else why == ""
+
+
+def test_the_broken_held_out_rows_are_those_whose_neighbours_are_driven(monkeypatch):
+    def job(name):
+        return SimpleNamespace(entry=SimpleNamespace(name=name))
+
+    made, driven = object.__new__(repair._Repairer), []
+    made.jobs, pipelines = [job("a"), job("b")], (10.0, 20.0)
+    made.bench = SimpleNamespace(
+        pipelines=pipelines, robust=lambda rows, _: np.array([not driven.append(rows), True])
+    )
+    monkeypatch.setattr(repair, "rows_of_job", lambda job, x: x + np.arange(4.0)[:, np.newaxis])
+    rows = [RowChange("b", 3, "broken", 0, 0), RowChange("a", 1, "fixed", 0, 0)]
+    rows.append(RowChange("a", 2, "broken", 0, 0))
+    assert made._robust(SimpleNamespace(difference=Difference("x", "y", tuple(rows))), ()) == 2
+    assert [x.tolist() for x in driven[0].X] == [[23.0], [12.0]]
+    assert driven[0].scene.tolist() == [1, 0]
 
 
 # --- The job ---

@@ -463,13 +463,12 @@ class _Repairer:
         """Return how many of the held-out variations that are broken fail robustly."""
         at = {job.entry.name: scene for scene, job in enumerate(self.jobs)}
         broken = [row for row in held_out.difference.rows if row.change == "broken"][:TESTED]
-        X = {
-            name: rows_of_job(self.jobs[at[name]], self.bench.pipelines[at[name]])
-            for name in {row.entry for row in broken}
-        }
+        pairs = zip(self.jobs, self.bench.pipelines, strict=True)
+        X = [rows_of_job(job, pipeline) for job, pipeline in pairs] if broken else []
         scene = np.array([at[row.entry] for row in broken], np.int64)
-        rows = Rows(tuple(X[row.entry][row.row] for row in broken), scene)
-        return int(self.bench.robust(rows, values).sum())
+        rows = zip(scene.tolist(), broken, strict=True)
+        found = Rows(tuple(X[k][row.row] for k, row in rows), scene)
+        return int(self.bench.robust(found, values).sum())
 
     def _modes(self, scene: int, run: Run, values: tuple[float, ...]) -> list[dict[str, Any]]:
         """Return the failure modes of a search, and how many of their examples do not pass now."""
