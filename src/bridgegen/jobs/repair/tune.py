@@ -138,6 +138,10 @@ class Bench:
         tunable: the driver's numbers.
         base: what they are now.
         seed: of neighbours.
+
+    Attributes:
+        failing: rows that settings are to mend; the job adds to them.
+        manners: mean jerk and travel time of settings that were checked, / those without.
     """
 
     def __init__(
@@ -151,7 +155,7 @@ class Bench:
         self.failing, self.guards, self.drawn = NONE, NONE, NONE
         self._base = np.zeros((0, 6))  # of drawn rows
         self._mannered = self._sought = 0
-        self._manners = dict[tuple[float, ...], Float]()  # / that of the base; of those checked
+        self.manners = dict[tuple[float, ...], Float]()
         self._refuted = set[tuple[float, ...]]()
         # What is known of rows that failed, and of guards: the first ones of each, by settings.
         self._failed = dict[tuple[float, ...], Float]()
@@ -203,10 +207,6 @@ class Bench:
             self._mannered = len(drawn.X)  # of the guards the first, by which manner is measured
         self.guards += drawn + found.at(np.flatnonzero(driven[:, PASSES]))
 
-    def add(self, failing: Rows) -> None:
-        """Add rows that fail; nothing has been tried on them."""
-        self.failing += failing
-
     def _known(
         self, of: dict[tuple[float, ...], Float], rows: Rows, values: tuple[float, ...]
     ) -> Float:
@@ -217,12 +217,7 @@ class Bench:
         return known
 
     def trial(self, values: tuple[float, ...], limit: float = np.inf) -> Trial:
-        """Try settings; what was driven before is not driven again.
-
-        Args:
-            values: of the tunable numbers.
-            limit: cost from which on guards are not driven.
-        """
+        """Try settings, on guards only below a cost; what was driven is not driven again."""
         failed = self._known(self._failed, self.failing, values)
         mends, cost = failed[:, PASSES] > 0.0, self._cost(values, failed)
         if cost >= limit:
@@ -335,7 +330,7 @@ class Bench:
 
     def _check(self, values: tuple[float, ...]) -> bool:
         """Return whether drawn rows support settings; else what they break become guards."""
-        if values in self._manners or values in self._refuted or values == self.base:
+        if values in self.manners or values in self._refuted or values == self.base:
             return values not in self._refuted
         n, size, driven = len(self.drawn.X), FIRST, np.zeros((0, 6))
         fails, is_well = int((self._base[:, FAILS] > 0.0).sum()), True
@@ -353,8 +348,8 @@ class Bench:
             self.guards += broken.at(np.arange(min(len(broken.X), TESTED)))
         else:
             passes = self._base[:, PASSES] > 0.0
-            self._manners[values] = _manner(driven[passes]) / _manner(self._base[passes])
-            is_well = bool((self._manners[values] <= 1.0 + WITHIN).all())
+            self.manners[values] = _manner(driven[passes]) / _manner(self._base[passes])
+            is_well = bool((self.manners[values] <= 1.0 + WITHIN).all())
         if not is_well:
             self._refuted.add(values)
         return is_well
@@ -369,11 +364,6 @@ class Bench:
         rows = Rows(tuple(x for X in near for x in X), np.repeat(some.scene, NEIGHBOURS))
         fails = self.drive(rows, values)[:, FAILS].reshape(-1, NEIGHBOURS)
         return np.asarray(fails.mean(axis=1) >= ROBUST)
-
-    def manner(self, values: tuple[float, ...]) -> tuple[float, float]:
-        """Return mean jerk and travel time of checked settings, / those without."""
-        jerk, time = self._manners.get(values, np.ones(2)).tolist()
-        return jerk, time
 
 
 def changes(before: Float, after: Float) -> tuple[Bool, Bool]:
