@@ -324,6 +324,13 @@ Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.ExternalObjectReferen
 
 _STEEPEST = 1.5  # rad, a steering angle that is as good as a right angle
 
+THINNEST = 0.001
+"""The least length and width of a body [m]: files may state 0."""
+
+WHEELBASE_SHARE = 0.61
+"""Distance between the axles by a vehicle's length [1], where they state none: as that of the cars
+in `bridgegen.scenario.named_models`."""
+
 
 def kind(body: Body) -> int:
     """Return what an entity is, see `bridgegen.drivers.kinds`."""
@@ -360,10 +367,26 @@ def limits_of(body: Body, place: str) -> Float:
 
 
 def wheelbase(tables: Tables, body: osc.Vehicle) -> float:
-    """Return the distance between the axles [m]; 0 of a vehicle with one axle."""
+    """Return the distance between the axles [m]; 0 of a trailer with one axle.
+
+    Of another vehicle that states none, the usual share of its length.
+    """
+    found = _apart(tables, body)
+    if found > 0.0 or body.vehicle_category in TRAILERS:
+        return found
+    return WHEELBASE_SHARE * _extent(tables, body.bounding_box.dimensions, "length")
+
+
+def _apart(tables: Tables, body: osc.Vehicle) -> float:
+    """Return how far the front axle is ahead of the rear one as it is stated [m]."""
     rear, front = body.axles.rear, body.axles.front or body.axles.rear
     ahead = tables.literal(front, "positionX", front.position_x)
     return ahead - tables.literal(rear, "positionX", rear.position_x)
+
+
+def _extent(tables: Tables, size: osc.Dimensions, name: str) -> float:
+    """Return the length or the width of a box [m]; not 0, which has no distance to others."""
+    return max(tables.literal(size, name, getattr(size, name)), THINNEST)
 
 
 def measures(tables: Tables, body: Body) -> tuple[float, ...]:
@@ -374,8 +397,8 @@ def measures(tables: Tables, body: Body) -> tuple[float, ...]:
     box = body.bounding_box
     height = tables.literal(box.dimensions, "height", box.dimensions.height)
     size = (
-        tables.literal(box.dimensions, "length", box.dimensions.length),
-        tables.literal(box.dimensions, "width", box.dimensions.width),
+        _extent(tables, box.dimensions, "length"),
+        _extent(tables, box.dimensions, "width"),
         tables.literal(box.center, "x", box.center.x),
     )
     if not isinstance(body, osc.Vehicle):
@@ -386,8 +409,8 @@ def measures(tables: Tables, body: Body) -> tuple[float, ...]:
     bend = elementary.tan(min(lock, _STEEPEST)) / max(distance, 0.1)
     if distance <= 0.0 and body.vehicle_category in TRAILERS:
         bend = math.inf  # it has nothing to steer with, and goes where it is led
-    elif distance <= 0.0:
-        tables.unsupported(axles, "a Vehicle without a FrontAxle ahead of its RearAxle")
+    elif _apart(tables, body) <= 0.0:
+        tables.note(axles, f"no FrontAxle ahead of the RearAxle: taken as {distance:g} m ahead")
     return (
         *size,
         tables.literal(limits, "maxSpeed", limits.max_speed),

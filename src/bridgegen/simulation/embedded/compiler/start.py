@@ -102,7 +102,7 @@ class Start:
                     else:
                         init[name] = self._tables.slot(speed)
                 elif isinstance(
-                    action, osc.LateralAction | osc.VisibilityAction
+                    action, osc.LateralAction | osc.VisibilityAction | osc.TrailerAction
                 ) or self._actions.lamps(inner):
                     first.append((wrapped, self._tables.entity(name)))
                 elif isinstance(inner, osc.FollowTrajectoryAction) and (

@@ -78,7 +78,7 @@ def usable_times(
     known = len(times) - stated.count(None)
     if known and math.isnan(times[0]):
         times[0] = 0.0
-    if sum(map(math.isfinite, times)) < 2:
+    if len(times) - sum(map(math.isnan, times)) < 2:
         what = "one time" if known else "no times"
         tables.note(line, f"it states {what}: followed at the entity's own speed")
         return ()
@@ -100,7 +100,7 @@ def filled(times: Sequence[float], knots: Float) -> list[float]:
         InputError: they do not increase.
     """
     clock = np.array(times, dtype=np.float64)
-    known = np.flatnonzero(np.isfinite(clock))
+    known = np.flatnonzero(~np.isnan(clock))
     if len(known) < len(clock):
         a, b = known[-2:]
         after = np.arange(b + 1, len(clock))
@@ -109,7 +109,7 @@ def filled(times: Sequence[float], knots: Float) -> list[float]:
             end = clock[b] + pace * (knots[after] - knots[b])
         clock = np.append(np.interp(knots[: b + 1], knots[known], clock[known]), end)
         clock[known] = np.asarray(times)[known]
-    if not (np.diff(clock) > 0.0).all():
+    if not (np.isfinite(clock).all() and (np.diff(clock) > 0.0).all()):
         shown = ", ".join(f"{time:g}" for time in clock[:10])
         raise InputError(f"a trajectory whose times [s] do not increase: {shown}")
     return [float(time) for time in clock]

@@ -337,7 +337,7 @@ class Ways:
             try:
                 times = filled(times, knots)
             except InputError as error:
-                raise InputError(f"{self._program.place}, line {spec.line}: {error}") from None
+                raise InputError(f"line {spec.line}: {error}") from None
         if spec.bends and times:
             times = np.interp(np.arange(len(corners)) * line[1], knots, times).tolist()
         self.timetables.append(timetable(corners, times) if times else _NO_TIMES)
