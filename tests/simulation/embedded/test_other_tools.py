@@ -102,6 +102,18 @@ def test_missing_times_of_a_line_too():
     assert place(out, 2.0)[:2] == pytest.approx((10.0, 50.0), abs=0.6)
 
 
+def test_a_line_with_times_may_be_begun_further_on():
+    """From 4 m on, of a line of 10 m at 2 m/s and 20 m at 5 m/s, each as fast as it says."""
+    shape, beyond = line((0, 0), (10, 5), (30, 9)), ' initialDistanceOffset="{}"'
+    out = told((follow(shape, RELATIVE, beyond.format(4)), after(1.0)))
+    for seconds, x in ((1.0, 4.0), (2.0, 6.0), (4.0, 10.0), (5.0, 15.0), (8.0, 30.0)):
+        assert place(out, seconds + 0.05)[:2] == pytest.approx((x, 50.0), abs=0.26)
+    assert out.v[0, 1, 50] == pytest.approx(2.0)
+    assert out.v[0, 1, 120] == pytest.approx(5.0)
+    with refuses(InputError, "30"):
+        told((follow(shape, RELATIVE, beyond.format(30)), after(1.0)))
+
+
 def test_whom_nothing_places_or_moves_is_absent():
     text = scenario((*NAMES, "lost"), STARTS)
     (note,) = simulator(text, None).program.notes

@@ -143,7 +143,6 @@ def test_events_tell_when_they_began():
     ("privates", "events", "text"),
     [
         (timed("bv", vertex(1, 0.0, 0.0), vertex(1, 1.0, 0.0)), "", "1 s"),
-        (timed("bv", *LINE, more=' initialDistanceOffset="3"'), "", 'initialDistanceOffset="3'),
     ],
 )  # fmt: skip
 def test_refusals(privates, events, text):

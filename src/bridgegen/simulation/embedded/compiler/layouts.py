@@ -133,7 +133,7 @@ class Layouts:
             timing = None
         start = action.initial_distance_offset
         if timing is not None and start not in (None, 0.0):
-            what = f'initialDistanceOffset="{start}" in a trajectory with times'
+            what = f'initialDistanceOffset="{start}" in a trajectory with times that is laid'
             self._tables.unsupported(action, what)
         return self._append(self._drawn(line, timing, entity, times), timing)
 

@@ -53,8 +53,10 @@ def compile_trajectory(tables: Tables, action: osc.FollowTrajectoryAction) -> Al
     if times and isinstance(timing, osc.Timing):
         times = check_times(tables, timing, times, elements)
     start = tables.literal(action, "initialDistanceOffset", action.initial_distance_offset or 0.0)
-    if times and start:
-        tables.unsupported(action, f'initialDistanceOffset="{start:g}" in a trajectory with times')
+    absolute = osc.ReferenceContext.ABSOLUTE
+    if times and start and getattr(timing, "domain_absolute_relative", None) is absolute:
+        tables.note(action, "absolute times say where it is, whatever its initialDistanceOffset")
+        start = 0.0
     return AlongTrajectory(tuple(points), action.line, times, curve, start)
 
 
@@ -113,6 +115,30 @@ def filled(times: Sequence[float], knots: Float) -> list[float]:
         shown = ", ".join(f"{time:g}" for time in clock[:10])
         raise InputError(f"a trajectory whose times [s] do not increase: {shown}")
     return [float(time) for time in clock]
+
+
+def begun(
+    corners: Sequence[Corner], times: Sequence[float], start: float
+) -> tuple[list[Corner], list[float]]:
+    """Return the rest of a line from a distance on [m], where one is when the line would begin.
+
+    Raises:
+        InputError: it is not that long.
+    """
+    steps = [elementary.hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(corners)]
+    knots = np.cumsum([0.0, *steps])
+    if not start < knots[-1]:
+        limit = f"less than the trajectory's length, {knots[-1]:g}"
+        raise InputError(f"initialDistanceOffset [m] must be {limit}, got {start:g}")
+    i = int(np.searchsorted(knots, start, side="right")) - 1
+    share = float((start - knots[i]) / steps[i])
+    (x, y, h), (x_end, y_end, h_end) = corners[i : i + 2]
+    if h is not None and h_end is not None:
+        h += share * math.remainder(h_end - h, math.tau)
+    late = times[i] + share * (times[i + 1] - times[i]) - times[0]
+    first = (x + share * (x_end - x), y + share * (y_end - y), h)
+    rest = [time - late for time in times[i + 1 :]]
+    return [first, *corners[i + 1 :]], [times[0], *rest]
 
 
 def check_times(
@@ -181,7 +207,7 @@ def polyline(corners: Sequence[Corner], *, may_stand: bool = False) -> tuple[Flo
     ), step
 
 
-def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
+def timetable(corners: Sequence[Corner], times: Sequence[float], start: float = 0.0) -> Float:
     """Return the timed poses of an entity that follows a trajectory.
 
     Position is linear between two vertices. Heading turns the short way round between two that
@@ -190,6 +216,7 @@ def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
     Args:
         corners: V ≥ 2 vertices.
         times: their times [s], increasing.
+        start: how far along its line the first one is [m].
 
     Returns:
         ``(V - 1, 10)``, a row per segment; see ``_follow_kernels``.
@@ -197,7 +224,7 @@ def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
     clock = np.asarray(times, dtype=np.float64)
     place = np.array([corner[:2] for corner in corners], dtype=np.float64)
     steps = np.diff(place, axis=0)
-    knots = np.cumsum([0.0, *elementary.hypot(steps[:, 0], steps[:, 1])])
+    knots = np.cumsum([start, *elementary.hypot(steps[:, 0], steps[:, 1])])
     begins, ends = _headings(corners, place)
     columns = (clock[:-1], clock[1:], *place[:-1].T, *place[1:].T, begins, ends)
     return np.stack((*columns, knots[:-1], knots[1:]), axis=1)

@@ -36,7 +36,13 @@ from bridgegen.openx.opendrive.routes import (
 )
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
 from bridgegen.simulation.embedded.compiler import curves as clothoids
-from bridgegen.simulation.embedded.compiler.trajectories import Corner, filled, polyline, timetable
+from bridgegen.simulation.embedded.compiler.trajectories import (
+    Corner,
+    begun,
+    filled,
+    polyline,
+    timetable,
+)
 from bridgegen.simulation.embedded.places.lanes import Lanes, Path, sampled
 from bridgegen.simulation.embedded.places.slopes import slopes
 from bridgegen.simulation.embedded.program import (
@@ -340,7 +346,9 @@ class Ways:
                 raise InputError(f"line {spec.line}: {error}") from None
         if spec.bends and times:
             times = np.interp(np.arange(len(corners)) * line[1], knots, times).tolist()
-        self.timetables.append(timetable(corners, times) if times else _NO_TIMES)
+        if times and spec.start:
+            corners, times = begun(corners, times, spec.start)
+        self.timetables.append(timetable(corners, times, spec.start) if times else _NO_TIMES)
         self._add_line(line, LANDS, spec.start)
 
     def _add_line(self, line: tuple[Float, float], follows: int, start: float = 0.0) -> None:
