@@ -164,7 +164,7 @@ class Courses:
             side = self._tables.choice(osc.LongitudinalDisplacement, action.displacement)
         row[codes.SIDE] = _SIDES[side]
         self._keep_off(row, action)
-        value = given[0] if given else 0.0
+        value: Value = given[0] if given else 0.0
         if self._tables.declared(value) < 0.0:
             value = self._size(action, value, row)
         slot = self._tables.slot(value)

@@ -125,9 +125,10 @@ class Layouts:
         line, stated = trajectory.shape.shape, action.time_reference.reference
         timing = stated if isinstance(stated, osc.Timing) else None
         times: tuple[float, ...] = ()
-        if timing is not None and isinstance(line, osc.Clothoid | osc.ClothoidSpline):
-            times = usable_times(self._tables, line, bends(self._tables, line)[2])
-            timing = timing if times else None
+        if isinstance(line, osc.Clothoid | osc.ClothoidSpline):
+            if timing is not None:
+                times = usable_times(self._tables, line, bends(self._tables, line)[2])
+                timing = timing if times else None
         elif timing is not None and not _has_times(line):
             self._tables.note(line, "it states no times: followed at the entity's own speed")
             timing = None
