@@ -175,7 +175,7 @@ def test_a_knife_edge_may_be_broken_where_ten_are_fixed_for_it():
     [
         (12, 1, 0, 3, ""),
         (0, 0, 0, 0, ""),
-        (12, 1, 1, 3, "1 robustly"),
+        (12, 1, 1, 3, "1 of them robustly"),
         (1, 1, 0, 0, "not 10 to 1"),
         (0, 0, 0, 7, "fix none"),
     ],

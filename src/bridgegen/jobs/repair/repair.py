@@ -133,7 +133,7 @@ class Repair:
         ]
         left = [(why, of[name]) for name, why in WHYS.items() if of[name]]
         return {
-            "numbers": Table(("number", "old", "new"), numbers),
+            "numbers": Table(("number", "old", "new" if self.repaired else "tried"), numbers),
             "left": Table(("left", "failures"), left, 1),
         }
 
@@ -499,7 +499,7 @@ def _refused(counts: dict[str, int], compared: int) -> str:
     """Say why held-out variations do not support settings; "" if they do."""
     fixed, broken, robust = counts["fixed"], counts["broken"], counts["robust"]
     if robust:
-        they = f"break {broken:,}, {robust:,} robustly: neighbours fail, too"
+        they = f"break {broken:,}, {robust:,} of them robustly: most neighbours fail, too"
     elif not supported(fixed, broken, robust):
         they = f"fix {fixed:,} and break {broken:,}, not {FIXED} to 1"
     elif not fixed and counts["both fail"]:
