@@ -3,8 +3,9 @@
 The joint distribution is that of the parameters' marginals, joined by a Gaussian copula of their
 normal scores, or by Student's; a marginal may depend on other parameters by formulas. The
 scenario's constraints condition it: rows that break one have probability 0, and the density of the
-others is raised by the same factor, one over the feasible share. The transform to standard normal space is that of the
-unconditioned distribution; there the feasible set is where `Exposure.feasible` holds.
+others is raised by the same factor, one over the feasible share. The transform to standard normal
+space is that of the unconditioned distribution; there the feasible set is where `Exposure.feasible`
+holds.
 Source: Rosenblatt, Annals of Mathematical Statistics 23 (1952) 470-472; for copulas see
 `bridgegen.scenario.exposure.dependence`.
 """

@@ -71,6 +71,18 @@ def read_exposure(source: str | Path, scenario: SearchedScenario | None = None) 
     return build_exposure(document.below("exposure"), scenario, folder)
 
 
+def scenario_of(source: str | Path) -> str:
+    """Return the name of the scenario of which a file, or an example that ships, is an exposure.
+
+    Raises:
+        FileFormatError: the file cannot be read.
+        UnknownNameError: no such example.
+    """
+    document, _ = _document(source)
+    data = document.data if isinstance(document.data, dict) else {}
+    return str(data.get("exposure_of", "no scenario")).rpartition("/")[2]
+
+
 def exposure_of(scenario: LogicalScenario) -> Exposure | None:
     """Return the exposure that a scenario's own file declares; None where it has no such block.
 
