@@ -81,7 +81,7 @@ def write_total(path: Path, total: "TotalRisk") -> None:
         picture=charts.intervals(drawn, "Probabilities per encounter, 95 %") if drawn else "",
         head=head,
         rows=linked,
-        near_misses=total.near_misses(),
+        near_misses=[*total.near_misses()],
         command=total.command,
     )
 

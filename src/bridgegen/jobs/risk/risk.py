@@ -330,7 +330,7 @@ def finish(asked: Asked, default: Path, road: Float | None = None) -> Risk:
         folder,
         ego=pipeline.driver.name,
         vehicle=pipeline.runner.vehicle,
-        exposure=["EXPOSURE" if isinstance(x, Exposure) else x for x in as_names(given.exposure)],
+        exposure=named_exposures(given),
         simulator_rows=given.simulator_rows if elsewhere else None,
     )
     total = budget + check + (HERE if there else 0)
@@ -378,6 +378,11 @@ def finish(asked: Asked, default: Path, road: Float | None = None) -> Risk:
     )  # fmt: skip
     result.write()
     return result
+
+
+def named_exposures(given: RiskOptions) -> list[Any]:
+    """Return exposures as a command names them."""
+    return ["EXPOSURE" if isinstance(x, Exposure) else x for x in as_names(given.exposure)]
 
 
 def _count(name: str) -> Count:

@@ -22,21 +22,26 @@ def sentence(risk: Risk) -> str:
 
 
 def _sentence(risk: Risk) -> str:
-    p, what = risk.probability(risk.event), WORDS[risk.event]
-    if risk.count == "ego":
-        what = f"{what} that the ego is responsible for or could have prevented"
+    p, what_ = risk.probability(risk.event), what(risk.event, risk.count)
     if p is None:
         reason = risk.findings[risk.event].doubt
-        return f"How likely {what} is, is not known: {reason}. {_advice(risk)}."
+        return f"How likely {what_} is, is not known: {reason}. {_advice(risk)}."
     if p.estimate == 0.0:
         return (
-            f"Of {risk.weighted.rows:,} encounters none was {what}: with 95 % confidence the "
+            f"Of {risk.weighted.rows:,} encounters none was {what_}: with 95 % confidence the "
             f"probability is below {number(p.upper)} per encounter (rule of three)."
         )
     return (
-        f"The probability of {what} is {number(p.estimate)} per encounter (95 %: {number(p.low)} "
+        f"The probability of {what_} is {number(p.estimate)} per encounter (95 %: {number(p.low)} "
         f"to {number(p.high)})."
     )
+
+
+def what(event: str, count: str) -> str:
+    """Return an event in words, with which conflicts count."""
+    if count == "any":
+        return WORDS[event]
+    return f"{WORDS[event]} that the ego is responsible for or could have prevented"
 
 
 def lines(risk: Risk) -> Iterator[str | Table]:

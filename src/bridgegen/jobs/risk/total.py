@@ -8,7 +8,7 @@ scenario gets would bias the sum. Each scenario's part of it is a risk of its ow
 import json
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -26,20 +26,22 @@ from bridgegen.jobs.frame import Judged, Table, as_names, command_of
 from bridgegen.jobs.risk import text
 from bridgegen.jobs.risk.estimators.problem import block_of
 from bridgegen.jobs.risk.estimators.total import DRAWS, Part, Total, rates_of, shared_out, total_of
+from bridgegen.jobs.risk.extremes import Extreme
 from bridgegen.jobs.risk.ledger import SETTINGS
 from bridgegen.jobs.risk.options import FIGURES, WORDS, RiskOptions
-from bridgegen.jobs.risk.outcomes import EVENTS, INJURY
+from bridgegen.jobs.risk.outcomes import EVENTS
 from bridgegen.jobs.risk.result import PAGE, RECORD, Risk
 from bridgegen.jobs.risk.risk import (
     LEAST_EVALUATIONS,
     Asked,
     estimate_risk,
     finish,
+    named_exposures,
     prepare,
     require,
 )
 from bridgegen.jobs.suite.entries import find_entries
-from bridgegen.pages.templates import number
+from bridgegen.pages.templates import counted, number
 from bridgegen.results.folder import claim
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.scenario.exposure.exposure import Encounters
@@ -58,6 +60,7 @@ _NORMAL = 1.96
 _MARGIN = 1.2  # of the rows for a precision: what first rounds say of them is uncertain
 _STREAM = 6  # of random numbers, beside those of estimators
 
+KEYS = {"h": "hour", "km": "km", "": "encounter"}
 UNITS = {"h": ("hour", 1.0), "km": ("1,000 km", 1000.0), "": ("encounter", 1.0)}
 """Units of a sum: its name in words, and how many of them that is."""
 
@@ -95,24 +98,22 @@ class TotalRisk:
         return [name for name, one in met.items() if not unit or _amount(one, unit)]
 
     @cached_property
-    def _sums(self) -> dict[tuple[str, str], Total | None]:
-        return {}
+    def totals(self) -> Mapping[tuple[str, str], Total | None]:
+        """The sums of an event's rates, by event and unit; None: not all of it is believed."""
+        return {
+            (name, unit): self.total(name, unit, self.members(unit))
+            for name in WORDS
+            for unit in self.units
+        }
 
-    def total(self, name: str, unit: str) -> Total | None:
-        """Return the sum of an event's rates per unit; None where a part of it is not believed.
+    def total(self, name: str, unit: str, of: Sequence[str]) -> Total | None:
+        """Return the sum of the rates of some scenarios.
 
         Args:
-            name: of the event, or of a serious injury.
+            name: of the event, or of a serious injury; "": collisions by near misses.
             unit: "h", "km", or "" for encounters of which each scenario has as many.
+            of: names.
         """
-        if (name, unit) not in self._sums:
-            of = self.members(unit)
-            known = of and all(self.risks[each].probability(name) for each in of)
-            self._sums[name, unit] = total_of(self._parts(name, unit, of)) if known else None
-        return self._sums[name, unit]
-
-    def _parts(self, name: str, unit: str, of: Sequence[str]) -> list[Part]:
-        """Return the parts of a sum; without an event's name, those of near misses."""
         parts = []
         for each in of:
             risk, met = self.risks[each], self.risks[each].exposure.encounters
@@ -122,141 +123,113 @@ class TotalRisk:
             if unit and met is not None:
                 rate = met.count / _amount(met, unit)
                 rates = rates_of(met.count, _amount(met, unit), random)
-            p, extreme = risk.probability(name) if name else None, risk.extreme
-            if p is not None:
+            if not name and (extreme := _extreme(risk)):
+                draws = (random.choice(extreme.resampled, DRAWS),) * 3
+                parts.append(Part(rate, rates, extreme.estimate, draws))
+            elif name and (p := risk.probability(name)):
                 parts.append(Part(rate, rates, p.estimate, risk.draws(name, random)))
-            elif extreme is not None:
-                draws = random.choice(extreme.resampled, DRAWS)
-                parts.append(Part(rate, rates, extreme.estimate, (draws,) * 3))
-        return parts
-
-    def narrowed(self, unit: str) -> dict[str, float]:
-        """Return by which share of its width more budget, all for it, would narrow the interval."""
-        found = self.total(self.event, unit)
-        if found is None:
-            return {}
-        whole = sum(found.simulated) + sum(found.counted)
-        spent = [self.risks[name].weighted.evaluations for name in self.members(unit)]
-        more = MORE * sum(spent)
-        gone = [v * more / (n + more) for v, n in zip(found.simulated, spent, strict=True)]
-        narrower = [1.0 - math.sqrt(max(1.0 - v / whole, 0.0)) if whole else 0.0 for v in gone]
-        return dict(zip(self.members(unit), narrower, strict=True))
-
-    def extreme(self, unit: str) -> tuple[Total | None, Total | None]:
-        """Return collisions by near misses, and by the simulations of the same scenarios.
-
-        None, and None, where near misses say nothing of any.
-        """
-        of = [name for name in self.members(unit) if _says(self.risks[name])]
-        known = all(self.risks[name].probability("collision") for name in of)
-        parts = self._parts("", unit, of)
-        return (
-            total_of(parts) if of else None,
-            total_of(self._parts("collision", unit, of)) if of and known else None,
-        )
-
-    # -- in words ------------------------------------------------------------------------------
+            else:
+                return None
+        return total_of(parts) if parts else None
 
     @property
     def sentence(self) -> str:
         """What it says, in some sentences."""
-        what = WORDS[self.event]
-        one = next(iter(self.risks.values()), None)
-        if one is not None and one.count == "ego":
-            what = f"{what} that the ego is responsible for or could have prevented"
+        of, rate = [*self.risks.values()], "mean probability" if self.units == ("",) else "rate"
+        what = f"The {rate} of {text.what(self.event, of[0].count)}"
         said = []
         for unit in self.units:
-            found, (words, size) = self.total(self.event, unit), UNITS[unit]
-            if found is not None:
-                zero = found.estimate == 0.0
-                each = (
-                    f"below {number(found.upper * size)}" if zero else number(found.estimate * size)
+            if (found := self.totals[self.event, unit]) is not None:
+                words, size = UNITS[unit]
+                low, middle, high, upper = (
+                    number(end * size)
+                    for end in (found.low, found.estimate, found.high, found.upper)
                 )
-                ends = f"{number(found.low * size)} to {number(found.high * size)}"
-                said.append(f"{each} per {words} (95 %{'' if zero else f': {ends}'})")
+                is_zero = found.estimate == 0.0
+                ends = f"below {upper} per {words} (95 %)" if is_zero else f"{middle} per {words}"
+                said.append(ends if is_zero else f"{ends} (95 %: {low} to {high})")
+        doubts = [
+            f"{name}: {risk.findings[self.event].doubt}"
+            for name, risk in self.risks.items()
+            if not risk.believed
+        ]
+        found_ = f"is {' and '.join(said)}, over {counted(len(of), 'scenario')}."
         if not said:
-            bad = [n for n in self.members(self.units[0]) if not self.risks[n].believed]
-            why = "; ".join(f"{n}: {self.risks[n].findings[self.event].doubt}" for n in bad)
-            text_ = f"How often {what} happens is not known: {why or 'no scenario is in the sum'}."
-        else:
-            of = f"{len(self.members(self.units[0]))} scenarios"
-            text_ = f"The rate of {what} is {' and '.join(said)}, summed over {of}."
-            if self.units == ("",):
-                text_ = text_.replace("summed over", "the mean over").replace("rate", "probability")
-                text_ += " No rate of encounters is known, so each is met as often as the others."
-        return " ".join([text_, *self.remarks])
+            found_ = f"is not known: {'; '.join(doubts)}."
+        return " ".join([f"{what} {found_}", *self.remarks()])
 
-    @property
-    def remarks(self) -> list[str]:
-        """What is not as one would expect, a sentence each."""
-        found = [f"Not in the sum: {name} ({why})." for name, why in self.left_out.items()]
+    def remarks(self) -> Iterator[str]:
+        """Yield what is not as one would expect, a sentence each."""
+        if self.units == ("",):
+            yield "No rate of encounters is known, so each is met as often as the others."
+        for name, why in self.left_out.items():
+            yield f"Not in the sum: {name} ({why})."
         for unit in self.units:
             if missing := [name for name in self.risks if name not in self.members(unit)]:
-                found.append(f"Not in the sum per {UNITS[unit][0]}: {', '.join(missing)}.")
+                yield f"Not in the sum per {UNITS[unit][0]}: {', '.join(missing)}."
         if self.uniform:
-            found.append(
-                f"Without an exposure, uniform over the ranges, which no road is like: "
-                f"{', '.join(self.uniform)}."
-            )
-        return found
+            names_ = ", ".join(self.uniform)
+            yield f"Uniform over the ranges, without an exposure, as no road is: {names_}."
+
+    @property
+    def narrowed(self) -> dict[str, float]:
+        """By which share more budget, all for one scenario, would narrow the interval, by name."""
+        of, found = self.members(self.units[0]), self.totals[self.event, self.units[0]]
+        if found is None:
+            return {}
+        spent = np.array([self.risks[name].weighted.evaluations for name in of])
+        more, simulated = MORE * spent.sum(), np.array(found.simulated)
+        gone = simulated * more / (spent + more) / (simulated.sum() + sum(found.counted))
+        return dict(zip(of, (1.0 - np.sqrt(1.0 - gone)).tolist(), strict=True))
 
     @property
     def advice(self) -> str:
         """What would narrow the interval most, in a sentence; "" where no sum is known."""
-        unit = self.units[0]
-        found, narrower = self.total(self.event, unit), self.narrowed(unit)
+        found, narrower = self.totals[self.event, self.units[0]], self.narrowed
         if found is None:
             return ""
-        whole = sum(found.simulated) + sum(found.counted)
-        share = sum(found.counted) / whole if whole else 0.0
         best = max(narrower, key=narrower.__getitem__)
-        most = self.members(unit)[int(np.argmax(found.counted))]
         said = (
             f"{percent(MORE)} more simulations narrow the interval most in {best}, by "
             f"{percent(narrower[best])}."
         )
+        share = sum(found.counted) / (sum(found.simulated) + sum(found.counted))
         if share > 0.5:
+            most = self.members(self.units[0])[int(np.argmax(found.counted))]
             said += (
                 f" {percent(share)} of its variance is how few encounters were counted, most of "
                 f"all of {most}: further recordings narrow it more."
             )
         return said
 
-    def rows(self) -> tuple[list[str], list[list[Any]]]:
-        """Return a table of the scenarios: its head and its rows, the largest shares first."""
-        unit = self.units[0]
-        words, size = UNITS[unit]
-        found, narrower = self.total(self.event, unit), self.narrowed(unit)
-        shares = dict(zip(self.members(unit), found.shares, strict=True)) if found else {}
-        head = ["scenario", f"encounters per {words}", "per encounter", "95 %", "share"]
-        head += ["simulations", f"{percent(MORE)} more narrow by"]
-        rows: list[list[Any]] = []
-        for name in sorted(self.risks, key=lambda each: -shares.get(each, 0.0)):
-            risk = self.risks[name]
-            met = risk.exposure.encounters
-            amount = _amount(met, unit) if unit else 0.0
-            value, width, _ = text.interval(risk.probability(self.event))
-            rate = number(met.count / amount * size) if met is not None and amount else "–"
-            share, less = (percent(of[name]) if name in of else "–" for of in (shares, narrower))
-            rows.append([name, rate, value, width, share, f"{risk.weighted.evaluations:,}", less])
-        return head, rows
-
-    def near_misses(self) -> list[str]:
-        """Return what near misses say, a sentence for each unit, and of how many scenarios."""
-        said = []
+    def near_misses(self) -> Iterator[str]:
+        """Yield what near misses say, a sentence for each unit, and of how many scenarios."""
         for unit in self.units:
-            found, beside = self.extreme(unit)
-            if found is not None:
-                said.append(text.near_misses(found, beside, *UNITS[unit]))
-        silent = [name for name, risk in self.risks.items() if not _says(risk)]
-        if silent:
-            said.append(
-                f"Near misses say nothing of {len(silent)} of {len(self.risks)} scenarios, which "
-                "are in neither; their pages say why."
+            of = [name for name in self.members(unit) if _extreme(self.risks[name])]
+            if (found := self.total("", unit, of)) is not None:
+                yield text.near_misses(found, self.total("collision", unit, of), *UNITS[unit])
+        if silent := sum(not _extreme(risk) for risk in self.risks.values()):
+            yield (
+                f"Near misses say nothing of {silent} of {counted(len(self.risks), 'scenario')}, "
+                "which are left out on both sides; their pages say why."
             )
-        return said
 
-    # -- as a result of a job ------------------------------------------------------------------
+    def rows(self) -> tuple[list[str], list[list[str]]]:
+        """Return a table of the scenarios: its head and its rows, the largest shares first."""
+        unit, found, narrower = self.units[0], self.totals[self.event, self.units[0]], self.narrowed
+        shares = dict(zip(self.members(unit), found.shares, strict=True)) if found else {}
+        words, size = UNITS[unit]
+        head = ["scenario", f"encounters per {words}", "per encounter", "95 %", "share of the sum"]
+        rows = []
+        for name in sorted(self.risks, key=lambda each: -shares.get(each, 0.0)):
+            risk, met = self.risks[name], self.risks[name].exposure.encounters
+            amount = _amount(met, unit)
+            rate = number(met.count / amount * size) if met and amount else "–"
+            parts = [percent(of[name]) if name in of else "–" for of in (shares, narrower)]
+            value, width, _ = text.interval(risk.probability(self.event))
+            row = [name, rate, value, width, parts[0], f"{risk.weighted.evaluations:,}", parts[1]]
+            rows.append(row)
+        return [*head, "simulations", f"{percent(MORE)} more narrow by"], rows
 
     @property
     def work(self) -> str:
@@ -265,33 +238,30 @@ class TotalRisk:
 
     def shown(self) -> list[str | Table]:
         """Return what the terminal shows."""
-        head, rows = self.rows()
         lines = [f"{'near misses':<12}{line}" for line in self.near_misses()]
         lines += [f"{'sharper':<12}{self.advice}"] if self.advice else []
-        return [
-            f"{self.sentence}\n",
-            Table(head, rows),
-            "",
-            *lines,
-            f"{'page':<12}{self.folder / PAGE}",
-        ]
+        lines.append(f"{'page':<12}{self.folder / PAGE}")
+        return [f"{self.sentence}\n", Table(*self.rows()), "", *lines]
 
     def to_json(self) -> dict[str, Any]:
         """Return what ``risk.json`` says."""
-        totals = {}
-        for unit in self.units:
-            key = {"h": "per_hour", "km": "per_km", "": "per_encounter"}[unit]
-            evt, _ = self.extreme(unit)
-            totals[key] = {
-                **{name: _plain(self.total(name, unit), self.members(unit)) for name in WORDS},
-                "near_misses": _plain(evt, ()),
-                "narrowed": self.narrowed(unit),
-            }
         return {
             "event": self.event,
             "sentence": self.sentence,
             "advice": self.advice,
-            **totals,
+            "near_misses": [*self.near_misses()],
+            "narrowed": self.narrowed,
+            **{
+                f"per_{key}": {
+                    name: found
+                    and vars(found)
+                    | {"shares": dict(zip(self.members(unit), found.shares, strict=True))}
+                    for (name, of), found in self.totals.items()
+                    if of == unit
+                }
+                for unit, key in KEYS.items()
+                if unit in self.units
+            },
             "left_out": dict(self.left_out),
             "uniform": list(self.uniform),
             "evaluations": self.spent,
@@ -301,31 +271,23 @@ class TotalRisk:
 
     def judged(self) -> tuple[Judged, ...]:
         """Return the figures of the sums; those that are not known are NaN."""
-        found = dict.fromkeys(FIGURES, math.nan) | {"evaluations": float(self.spent)}
-        for name in (*EVENTS, INJURY):
-            for unit in self.units:
-                end = {"h": "_per_hour", "km": "_per_km", "": ""}[unit]
-                if (total := self.total(name, unit)) is not None:
-                    found[f"{name}{end}"] = total.estimate
-                    found[f"{name}{end}_upper"] = total.upper
-        one = next(iter(self.risks.values()), None)
-        driver = one.driver if one else ""
+        figures = dict.fromkeys(FIGURES, math.nan) | {"evaluations": float(self.spent)}
+        for (name, unit), found in self.totals.items():
+            end = f"_per_{KEYS[unit]}" if unit else ""
+            if found is not None:
+                figures |= {f"{name}{end}": found.estimate, f"{name}{end}_upper": found.upper}
+        driver = next(iter(self.risks.values())).driver
         return (
             Judged(
                 suite="total risk",
                 group=f"bridgegen.total.{driver.replace('.', '_')}",
                 test="the interval is believed",
-                holds=self.total(self.event, self.units[0]) is not None and self.whole,
+                holds=self.totals[self.event, self.units[0]] is not None,
                 details=self.sentence,
-                figures=found,
+                figures=figures,
                 facts={"ego": driver, "command": self.command},
             ),
         )
-
-    @property
-    def whole(self) -> bool:
-        """Whether all scenarios whose rate of encounters is known are in the sum."""
-        return all(risk.believed for risk in self.risks.values())
 
     def write(self) -> None:
         """Write the record and the page.
@@ -341,19 +303,12 @@ class TotalRisk:
 
 def _amount(met: Encounters | None, unit: str) -> float:
     """Return in how many hours or kilometres encounters were counted; 0 where it is not known."""
-    found = None if met is None else met.hours if unit == "h" else met.km
+    found = None if met is None or not unit else met.hours if unit == "h" else met.km
     return found or 0.0
 
 
-def _says(risk: Risk) -> bool:
-    return risk.extreme is not None and not risk.extreme.doubt
-
-
-def _plain(found: Total | None, members: Sequence[str]) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    ends = {key: getattr(found, key) for key in ("estimate", "low", "high", "upper")}
-    return {**ends, "shares": dict(zip(members, found.shares, strict=False))}
+def _extreme(risk: Risk) -> Extreme | None:
+    return risk.extreme if risk.extreme is not None and not risk.extreme.doubt else None
 
 
 # --- The job ---
@@ -388,32 +343,27 @@ def estimate_total_risk(given: RiskOptions) -> TotalRisk:
     if used := [name for name, value in {**alone, "--check": given.check}.items() if value]:
         raise InputError(f"{', '.join(used)}: for one scenario, not for the sum of several")
     scenarios, left_out = _scenarios(given)
-    folder = Path("risk", "total") if given.out is None else Path(given.out)
     exposures, uniform = _exposures(given, scenarios)
-    command = command_of(
-        "risk",
-        given,
-        folder,
-        exposure=["EXPOSURE" if isinstance(x, Exposure) else x for x in as_names(given.exposure)],
-    )
+    folder = Path("risk", "total") if given.out is None else Path(given.out)
+    command = command_of("risk", given, folder, exposure=named_exposures(given))
+    asked: dict[str, Asked] = {}
+    problems: list[str] = []
     with open_workers(given.workers) as hands:
-        asked: dict[str, Asked] = {}
-        problems: list[str] = []
         for name, scenario in scenarios.items():
             own = replace(given, scenario=(scenario,), exposure=exposures[name], every=False)
             try:
                 asked[name] = prepare(own, hands)
             except BridgeGenError as error:
                 problems += [f"{name}: {problem}" for problem in error.problems]
-        if problems:
-            raise InputError(*problems)
         rated = {name: one for name, one in asked.items() if one.exposure.encounters is not None}
         left_out |= {name: "no rate of encounters" for name in asked if rated and name not in rated}
         asked = rated or asked
-        if (least := 4 * LEAST_EVALUATIONS * len(asked)) > given.budget:
-            raise InputError(
+        if (least := 4 * LEAST_EVALUATIONS * len(asked)) > given.budget and not problems:
+            problems.append(
                 f"--budget must be at least {least} for {len(asked)} scenarios, got {given.budget}"
             )
+        if problems:
+            raise InputError(*problems)
         claim(
             folder,
             {name: one.settings(given) for name, one in asked.items()},
@@ -422,30 +372,25 @@ def estimate_total_risk(given: RiskOptions) -> TotalRisk:
             pieces=SCENARIOS,
             belongs=lambda name: name in (RECORD, PAGE, ROUNDS),
         )
+        rounds = _Rounds(asked, given, folder)
         try:
-            risks, spent = _in_rounds(asked, given, folder)
-        except (Interrupted, KeyboardInterrupt) as stop:
-            done = stop.evaluations if isinstance(stop, Interrupted) else 0
-            raise Interrupted(folder, done, given.budget, command=command) from None
-    result = TotalRisk(risks, left_out, uniform, given.event, spent, command, folder)
+            risks = rounds.risks()
+        except (Interrupted, KeyboardInterrupt):
+            raise Interrupted(folder, rounds.spent, given.budget, command=command) from None
+    result = TotalRisk(risks, left_out, uniform, given.event, rounds.spent, command, folder)
     result.write()
     return result
 
 
 def _scenarios(given: RiskOptions) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the scenarios by name, and those of which there can be no risk."""
+    """Return the scenarios by name, and why there can be no risk of the others."""
     named = as_names(given.scenario)
-    if given.every and named:
-        raise InputError(f"--catalogue has every scenario of the catalogue: no {named[0]}")
-    if not named and not given.every:
-        raise InputError("missing: SCENARIO, or --catalogue for all that ship")
-    found: dict[str, str] = {}
-    left_out: dict[str, str] = {}
+    if given.every == bool(named):
+        raise InputError("one of both must be given: SCENARIO, or --catalogue for all that ship")
+    found, left_out = dict[str, str](), dict[str, str]()
     for entry in find_entries(names() if given.every else named):
-        if entry.scenario.lower().endswith(".xosc"):
-            left_out[entry.name] = "an OpenSCENARIO file, which has no exposure"
-        elif entry.problem:
-            left_out[entry.name] = entry.problem
+        if entry.problem or entry.scenario.lower().endswith(".xosc"):
+            left_out[entry.name] = entry.problem or "an OpenSCENARIO file, which has no exposure"
         else:
             found[entry.name] = entry.scenario
     if not found:
@@ -462,98 +407,94 @@ def _exposures(
         InputError: an exposure of none of the scenarios, or two of one.
     """
     loaded = {name: load(scenario) for name, scenario in scenarios.items()}
-    by_name: dict[str, Any] = {}
+    found: dict[str, tuple[Any, ...]] = {}
     problems = []
-    known = {one.name for one in loaded.values()}
     for item in as_names(given.exposure):
         if item == UNIFORM:
             continue
         of = item.scenario.name if isinstance(item, Exposure) else scenario_of(item)
-        if of not in known:
+        mine = [name for name, one in loaded.items() if one.name == of]
+        if not mine:
             problems.append(f"{item}: an exposure of {of}, which is none of the scenarios")
-        elif of in by_name:
-            problems.append(f"{of} has two exposures: {by_name[of]} and {item}")
-        by_name[of] = item
+        elif mine[0] in found:
+            problems.append(f"{of} has two exposures: {found[mine[0]][0]} and {item}")
+        found |= dict.fromkeys(mine, (item,))
     if problems:
         raise InputError(*problems)
-    found, uniform = {}, []
-    for name, one in loaded.items():
-        chosen = by_name.get(one.name)
-        if chosen is None and one.exposure is None:
-            chosen = UNIFORM
-            uniform.append(name)
-        found[name] = () if chosen is None else (chosen,)
-    return found, tuple(uniform)
+    without = [name for name, one in loaded.items() if name not in found and one.exposure is None]
+    found |= dict.fromkeys(without, (UNIFORM,))
+    return {name: found.get(name, ()) for name in loaded}, tuple(without)
 
 
-def _in_rounds(
-    asked: Mapping[str, Asked], given: RiskOptions, folder: Path
-) -> tuple[dict[str, Risk], int]:
-    """Return the risk of each scenario, of the last round, and the evaluations of all."""
-    k, budget, say = len(asked), given.budget, given.callbacks
-    weights = {name: _weight(one.exposure.encounters) for name, one in asked.items()}
-    roads: dict[str, list[Float]] = {name: [] for name in asked}
-    spreads = dict.fromkeys(asked, 1.0)
-    means = dict.fromkeys(asked, 0.0)
-    spent = 0
+class _Rounds:
+    """The rounds in which a budget is shared out.
 
-    def of_round(turn: int, name: str, **changes: Any) -> RiskOptions:
-        before = spent
-        calls = replace(
-            say, progress=lambda what, n, _, facts: say.progress(what, before + n, budget, name)
-        )
-        # Each scenario's random numbers are its own, and those of each round: equal ones would
-        # make their errors alike.
-        seed = np.random.SeedSequence((given.seed, turn, zlib.crc32(name.encode())))
-        return replace(
-            asked[name].given,
-            seed=int(seed.generate_state(1)[0]),
-            precision=0.0,
-            callbacks=calls,
-            **changes,
-        )
+    Args:
+        asked: the scenarios.
+        given: the options.
+        folder: of the total.
+    """
 
-    even = max(int(FIRST * budget / k), min(ENOUGH, int(AT_MOST * budget / k)), LEAST_EVALUATIONS)
-    for turn, method in enumerate(("mc", given.method)):
-        rows = [even] * k
-        if turn:
-            rows = shared_out(int(SECOND * budget), [*spreads.values()], LEAST_EVALUATIONS)
-        for name, n in zip(asked, rows, strict=True):
-            own = of_round(turn, name, method=method, budget=n)
-            place = folder / ROUNDS / str(turn + 1) / name
-            experiment = asked[name].experiment(own, place, n)
-            try:
-                found = asked[name].estimate(own, experiment).weighted
-            except KeyboardInterrupt:
-                raise Interrupted(folder, spent + experiment.evaluations, budget) from None
-            spent += experiment.evaluations
-            roads[name] += [found.road] if found.road.size else []
-            if not found.doubts:
-                there = found.there(EVENTS[given.event].score)
-                draws = found.draws(there, block_of(own.seed, 0, _STREAM), 1000)[2]
-                used = max(found.evaluations, 1)
-                spreads[name] = weights[name] * float(draws.std()) * math.sqrt(used)
-                means[name] = weights[name] * found.mean(there).estimate
-    left = max(budget - spent, LEAST_EVALUATIONS * k)
-    if given.precision > 0.0 and (sum_ := sum(means.values())) > 0.0:
-        needed = (_NORMAL * sum(spreads.values()) / (given.precision * sum_)) ** 2
-        left = min(left, max(int(_MARGIN * needed), LEAST_EVALUATIONS * k))
-    risks = {}
-    rows = shared_out(left, [*spreads.values()], LEAST_EVALUATIONS)
-    for name, n in zip(asked, rows, strict=True):
-        own = of_round(2, name, budget=n, out=folder / SCENARIOS / name)
-        try:
-            road = np.concatenate(roads[name]) if roads[name] else None
-            risks[name] = finish(replace(asked[name], given=own), folder, road)
-        except Interrupted as stop:
-            raise Interrupted(folder, spent + stop.evaluations, budget) from None
-        spent += risks[name].weighted.evaluations
-    return risks, spent
+    def __init__(self, asked: Mapping[str, Asked], given: RiskOptions, folder: Path) -> None:
+        self._asked, self._given, self._folder = asked, given, folder
+        self.spent = 0
+        self._roads: dict[str, list[Float]] = {name: [] for name in asked}
+        self._spreads, self._means = dict.fromkeys(asked, 1.0), dict.fromkeys(asked, 0.0)
 
+    def risks(self) -> dict[str, Risk]:
+        """Return the risk of each scenario, by the last round."""
+        given, k = self._given, len(self._asked)
+        budget, least = given.budget, LEAST_EVALUATIONS * k
+        even = max(int(FIRST * budget), min(ENOUGH * k, int(AT_MOST * budget)), least)
+        for turn, (rows, method) in enumerate(((even, "mc"), (int(SECOND * budget), given.method))):
+            for name, own in self._shared(turn, rows, method):
+                self._look(name, own, self._folder / ROUNDS / str(turn + 1) / name)
+        left = max(budget - self.spent, least)
+        if given.precision > 0.0 and (mean := sum(self._means.values())) > 0.0:
+            needed = (_NORMAL * sum(self._spreads.values()) / (given.precision * mean)) ** 2
+            left = min(left, max(int(_MARGIN * needed), least))
+        found = {}
+        for name, own in self._shared(2, left, given.method):
+            place, road = self._folder / SCENARIOS / name, self._roads[name]
+            one = replace(self._asked[name], given=replace(own, out=place))
+            found[name] = finish(one, place, np.concatenate(road) if road else None)
+            self.spent += found[name].weighted.evaluations
+        return found
 
-def _weight(met: Encounters | None) -> float:
-    """Return how much an encounter counts when the budget is shared out."""
-    if met is None:
-        return 1.0
-    hours = met.hours or (met.km or 0.0) / SPEED
-    return (met.count + 1) / hours
+    def _shared(self, turn: int, rows: int, method: str) -> Iterator[tuple[str, RiskOptions]]:
+        """Yield the options of each scenario in a round."""
+        say = self._given.callbacks
+        shares = shared_out(rows, [*self._spreads.values()], LEAST_EVALUATIONS)
+        for (name, one), n in zip([*self._asked.items()], shares, strict=True):
+            calls = replace(say, progress=self._progress(name))
+            # Each scenario's random numbers are its own, and each round's: equal ones would make
+            # their errors alike.
+            entropy = (self._given.seed, turn, zlib.crc32(name.encode()))
+            seed = int(np.random.SeedSequence(entropy).generate_state(1)[0])
+            yield (
+                name,
+                replace(
+                    one.given, callbacks=calls, method=method, budget=n, seed=seed, precision=0.0
+                ),
+            )
+
+    def _progress(self, name: str) -> Callable[[str, int, int, str], None]:
+        say, before, budget = self._given.callbacks.progress, self.spent, self._given.budget
+        return lambda what, done, total, facts: say(what, before + done, budget, name)
+
+    def _look(self, name: str, own: RiskOptions, place: Path) -> None:
+        """Estimate how much a scenario's part leaves open."""
+        one = self._asked[name]
+        experiment = one.experiment(own, place, own.budget)
+        found = one.estimate(own, experiment).weighted
+        self.spent += experiment.evaluations
+        self._roads[name] += [found.road] if found.road.size else []
+        if not found.doubts:
+            there = found.there(EVENTS[own.event].score)
+            draws = found.draws(there, block_of(own.seed, 0, _STREAM), 1000)
+            open_ = max(draws[0].std(), draws[2].std())  # of nothing and of all one is 0
+            met = one.exposure.encounters
+            # Encounters per hour; those per km count beside others as if driven at 50 km/h.
+            rate = (met.count + 1) / (met.hours or (met.km or 0.0) / SPEED) if met else 1.0
+            self._spreads[name] = rate * float(open_) * math.sqrt(max(found.evaluations, 1))
+            self._means[name] = rate * found.mean(there).estimate

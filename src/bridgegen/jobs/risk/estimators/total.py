@@ -101,7 +101,11 @@ def total_of(parts: Sequence[Part]) -> Total:
         max(end, estimate),
         max(upper, estimate),
         tuple(item / estimate if estimate > 0.0 else 0.0 for item in estimates),
-        tuple(part.rate**2 * float(part.probabilities[2].var()) for part in parts),
+        tuple(
+            float(part.rates[1].mean()) ** 2
+            * float(max(part.probabilities[0].var(), part.probabilities[2].var()))
+            for part in parts
+        ),
         tuple(
             float(part.rates[1].var()) * float(part.probabilities[2].mean()) ** 2 for part in parts
         ),

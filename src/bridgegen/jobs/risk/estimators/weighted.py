@@ -144,6 +144,8 @@ class Weighted:
         u = (random.permutation(n) + 0.5) / n
         parts = self.weights * values
         held = parts[parts > 0.0]
+        lower: Float
+        upper: Float
         if self.repetitions:
             sums = self.sums(values)
             # Student's spread of the mean of few, by the variance of a gamma distribution.
