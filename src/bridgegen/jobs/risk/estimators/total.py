@@ -14,12 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.special
 
 from bridgegen.base.arrays import Float
 
 DRAWS = 10_000
-"""Number of draws: the ends of an interval of ±20 % move by some 0.3 % with their seed."""
+"""Number of draws: the level of an end, 2.5 %, is off by 0.16 % then."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +72,8 @@ def rates_of(
         random: all random numbers.
         n: how many draws.
     """
-    u = (random.permutation(n) + 0.5) / n
-    low = scipy.special.gammaincinv(count, u) if count else np.zeros(n)
-    return low / amount, scipy.special.gammaincinv(count + 1, u) / amount
+    low = random.standard_gamma(count, n) if count else np.zeros(n)
+    return low / amount, (low + random.standard_exponential(n)) / amount
 
 
 def total_of(parts: Sequence[Part]) -> Total:

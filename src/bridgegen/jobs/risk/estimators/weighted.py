@@ -12,7 +12,6 @@ Journal 59 (2017) 1174-1186.
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.special
 import scipy.stats
 
 from bridgegen.base.arrays import Float, Int
@@ -141,31 +140,28 @@ class Weighted:
             have that were not seen; and that with one more hit of the largest weight, of which the
             upper ends of the mean by itself are quantiles (Fay and Feuer's upper end).
         """
-        u = (random.permutation(n) + 0.5) / n
         parts = self.weights * values
         held = parts[parts > 0.0]
-        lower: Float
-        upper: Float
         if self.repetitions:
             sums = self.sums(values)
             # Student's spread of the mean of few, by the variance of a gamma distribution.
             wide = float(scipy.stats.t.ppf(0.975, len(sums) - 1) / scipy.stats.norm.ppf(0.975)) ** 2
             lower, upper = (
-                _gamma(float(some.mean()), wide * float(some.var(ddof=1)) / len(sums), u)
+                _gamma(float(some.mean()), wide * float(some.var(ddof=1)) / len(sums), random, n)
                 for some in (sums, np.append(sums, sums.max()))
             )
             upper = upper if held.size else np.ones(n)
         elif not held.size or np.ptp(held) == 0.0:
             hits, rows = held.size, self.rows
             factor = rows * float(held[0] if hits else self.largest)
-            lower = factor * scipy.special.betaincinv(hits, rows - hits + 1, u) if hits else 0.0 * u
+            lower = factor * random.beta(hits, rows - hits + 1, n) if hits else np.zeros(n)
             upper = np.full(n, factor) if rows else np.ones(n)
             if hits < rows:
-                upper = factor * scipy.special.betaincinv(hits + 1, rows - hits, u)
+                upper = factor * random.beta(hits + 1, rows - hits, n)
         else:
             total, square, largest = float(held.sum()), float(held @ held), float(held.max())
-            lower = _gamma(total, square, u)
-            upper = _gamma(total + largest, square + largest**2, u)
+            lower = _gamma(total, square, random, n)
+            upper = _gamma(total + largest, square + largest**2, random, n)
         low, middle, high = self.share
         less, more = random.exponential(size=(2, n))
         # 97.5 % of exponential numbers are below 3.69, and 95 % below 3, as in the rule of three.
@@ -174,13 +170,10 @@ class Weighted:
         return lower * lowered, np.minimum(lower * raised, 1.0), np.minimum(upper * raised, 1.0)
 
 
-def _gamma(mean: float, variance: float, u: Float) -> Float:
-    """Return quantiles of a gamma distribution."""
+def _gamma(mean: float, variance: float, random: np.random.Generator, n: int) -> Float:
     if not (mean > 0.0 and variance > 0.0):
-        return np.full(len(u), mean)
-    shape = mean * mean / variance
-    found: Float = scipy.special.gammaincinv(shape, u) * (variance / mean)
-    return found
+        return np.full(n, mean)
+    return random.gamma(mean * mean / variance, variance / mean, n)
 
 
 def of_counts(hits: int, rows: int, each: float) -> Probability:
