@@ -19,7 +19,7 @@ from bridgegen.jobs.risk.text import (
     sentence,
 )
 from bridgegen.pages import charts, templates
-from bridgegen.pages.templates import Banner, Cell, number, odds
+from bridgegen.pages.templates import Banner, Cell, counted, number, odds
 
 if TYPE_CHECKING:
     from bridgegen.jobs.risk.total import TotalRisk
@@ -75,7 +75,7 @@ def write_total(path: Path, total: "TotalRisk") -> None:
         path,
         "jobs/risk/total.html",
         title="Risk of several scenarios",
-        facts=[total.work, f"{len(total.risks)} scenarios"],
+        facts=[f"driver {total.driver}", total.work, counted(len(total.risks), "scenario")],
         verdict=Banner(total.sentence),
         advice=total.advice,
         picture=charts.intervals(drawn, "Probabilities per encounter, 95 %") if drawn else "",

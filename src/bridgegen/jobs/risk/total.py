@@ -88,6 +88,11 @@ class TotalRisk:
     folder: Path
 
     @property
+    def driver(self) -> str:
+        """The driver of the ego."""
+        return next(iter(self.risks.values())).driver
+
+    @property
     def units(self) -> tuple[str, ...]:
         """The units of sums: hours and kilometres as far as known, else encounters."""
         return tuple(unit for unit in ("h", "km") if self.members(unit)) or ("",)
@@ -229,7 +234,9 @@ class TotalRisk:
             value, width, _ = text.interval(risk.probability(self.event))
             row = [name, rate, value, width, parts[0], f"{risk.weighted.evaluations:,}", parts[1]]
             rows.append(row)
-        return [*head, "simulations", f"{percent(MORE)} more narrow by"], rows
+        head += ["simulations", f"{percent(MORE)} more narrow by"]
+        at = 1 if unit else 2  # per encounter there is no rate of encounters
+        return [head[0], *head[at:]], [[row[0], *row[at:]] for row in rows]
 
     @property
     def work(self) -> str:
@@ -276,7 +283,7 @@ class TotalRisk:
             end = f"_per_{KEYS[unit]}" if unit else ""
             if found is not None:
                 figures |= {f"{name}{end}": found.estimate, f"{name}{end}_upper": found.upper}
-        driver = next(iter(self.risks.values())).driver
+        driver = self.driver
         return (
             Judged(
                 suite="total risk",
