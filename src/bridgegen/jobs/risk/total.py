@@ -89,8 +89,8 @@ class TotalRisk:
 
     @property
     def driver(self) -> str:
-        """The driver of the ego."""
-        return next(iter(self.risks.values())).driver
+        """The driver of the ego; all, where scenarios have their own."""
+        return ", ".join(dict.fromkeys(risk.driver for risk in self.risks.values()))
 
     @property
     def units(self) -> tuple[str, ...]:
