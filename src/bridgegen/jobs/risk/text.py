@@ -131,9 +131,12 @@ def near_misses(
         agrees = f"that disagrees with the simulations, by which there are {many}"
     else:
         agrees = "that agrees with the simulations"
+    often = f"happens {middle} times per {per} (bootstrap, 95 %: {low} to {high})"
+    if found.high == 0.0:
+        often = "does not happen: all extremes stop short of it"
     return (
         "By near misses alone (extreme values of the time to collision, extrapolated) a collision "
-        f"happens {middle} times per {per} (bootstrap, 95 %: {low} to {high}); {agrees}."
+        f"{often}; {agrees}."
     )
 
 
