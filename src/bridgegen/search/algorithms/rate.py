@@ -191,22 +191,37 @@ class Rate:
             0.0,
             1.0,
         ),
+        "precision": Setting(
+            0.2,
+            "end when the 95 % interval's half-width is below this fraction of the probability, "
+            "and no failure mode is new; 0: at the end of the budget",
+            0.0,
+            1.0,
+        ),
+        "quiet": Setting(
+            0.25, "share of the rows without a new failure mode before it ends", 0.05, 0.95
+        ),
     }
     objectives: ClassVar[Arity] = "one"
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
-        self._values = resolve(type(self), problem, seed, settings)
-        self._road: Road = problem.road or Everywhere(problem.n_var)
+        self.values = resolve(type(self), problem, seed, settings)
+        self.road: Road = problem.road or Everywhere(problem.n_var)
         self._is_even = problem.road is None
-        self._known = Known(problem, self._values["apart"])
+        self._known = Known(problem, self.values["apart"])
         self._rng = np.random.Generator(np.random.PCG64(seed))
         self._of_objective: Parameters | None = None
         self._of_label: Parameters | None = None
-        self.draws = Draws.none(problem.n_var, self._road.dimensions)
+        self.draws = Draws.none(problem.n_var, self.road.dimensions)
+
+    @property
+    def critical(self) -> Bool:
+        """Which of the rows that are told are critical, in the order of ``draws``."""
+        return self._known.critical
 
     def ask(self) -> Float:
         """Return rows as on the road and over the ranges at first, then batches."""
-        known, values = self._known, self._values
+        known, values = self._known, self.values
         many = max(int(known.critical.sum()), len(known) // 10)
         n = max(values["batch"], int(values["growth"] * many)) if len(known) else values["initial"]
         pool = self._pool()
@@ -253,7 +268,7 @@ class Rate:
 
     def _pool(self) -> _Pool:
         """Return a new pool."""
-        rng, road, known = self._rng, self._road, self._known
+        rng, road, known = self._rng, self.road, self._known
         best = np.argsort(known.F, kind="stable")[:BEST]
         bases = self.draws.Z[np.union1d(known.distinct[-FOUND:], best)]
         a, b = (POOL_ROAD, POOL_EVEN) if len(bases) else (0.5, 0.5)
@@ -308,7 +323,7 @@ class Rate:
         some = rng.permutation(len(pool.U))[:PATHS]
         paths = model.objective.sample(pool.points[some], max(n // 3, 1), rng)
         off = distances(pool.points, known.points[known.distinct])
-        apart, joined = self._values["apart"], 0
+        apart, joined = self.values["apart"], 0
 
         def seek(k: int, taken: list[int]) -> Float:
             nonlocal apart, joined, off

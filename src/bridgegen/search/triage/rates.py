@@ -1,11 +1,14 @@
 """How likely harm is, from the rows of a search that were drawn with known chances."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.statistics import clopper_pearson, weighted_counts
+from bridgegen.scenario.exposure.exposure import Rate
 from bridgegen.search.algorithms.rate import Draws
 from bridgegen.search.triage.record import Frequency
 
@@ -28,12 +31,16 @@ class Drawn:
         ids: ``(n,)``, the evaluation of each; some may have been drawn twice.
         share: the feasible share of the exposure, and its interval: low, estimate, high.
         source: of the exposure; "" where rows stand for the ranges.
+        met: how often the scenario is met, by the amount of driving; empty where that is not known.
+        left: evaluations of the budget that were not needed.
     """
 
     draws: Draws
     ids: Int
     share: tuple[float, float, float]
     source: str
+    met: Mapping[Literal["hour", "1,000 km"], Rate] = field(default_factory=dict)
+    left: int = 0
 
 
 def row_weights(draws: Draws) -> Float:
