@@ -479,7 +479,10 @@ def _with_algorithm(
         given = replace(given, algorithm=RATE)
     if given.algorithm == RATE:
         if given.screen is not None:
-            raise InputError("--rate draws rows of the simulator itself: leave out --screen")
+            raise InputError(
+                "--rate needs the chance of each row, which is not known of rows that a screen "
+                "proposes: leave out --screen"
+            )
         return replace(given, rate=True)
     if given.algorithm != AUTO:
         return given
