@@ -4,7 +4,6 @@ import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,11 +46,11 @@ def list_scenarios(
 ) -> None:
     """Logical scenarios of the catalogue."""
     from bridgegen.cli.terminal.tables import print_entries, print_table
-    from bridgegen.scenario.language.reader import load, names
+    from bridgegen.scenario.language.reader import document_of, names
     from bridgegen.scenario.typology import typologies
 
     if not typology:
-        rows = [(name, load(name).title) for name in names()]
+        rows = [(name, document_of(name)[0].data["title"]) for name in names()]
         print_table(("scenario", "title"), rows, as_json=as_json)
     elif as_json:
         print(json.dumps([asdict(each) for each in typologies().values()], indent=2))
@@ -78,15 +77,17 @@ def _typologies(scenarios: Sequence[str]) -> Listed:
 @_of("packs")
 def _packs() -> Listed:
     """Logical scenarios of the packs, with their clauses."""
-    from bridgegen.scenario.language.reader import load, pack_names, pack_tables
+    from bridgegen.scenario.language.reader import document_of, names, pack_names, pack_tables
 
-    read = cache(load)
-    made = [(name, read(name)) for name in pack_names()]
-    rows = [(name, it.title, ", ".join(each.id for each in it.clauses)) for name, it in made]
+    files = {name: document_of(name)[0].data for name in (*names(), *pack_names())}
+    rows = []
+    for name in pack_names():
+        ids = ", ".join(clause["id"] for clause in files[name].get("clauses", []))
+        rows.append((name, files[name]["title"], ids))
     for pack, table in pack_tables().items():
         for entry, (scenario, keys) in table.entries.items():
             ids = ", ".join(map(table.id_of, keys))
-            rows.append((f"{pack}/{entry}", read(scenario).title, ids))
+            rows.append((f"{pack}/{entry}", files[scenario]["title"], ids))
         rows += [(f"{pack}: not answered", text, id) for id, text, _ in table.unanswered]
     return ("scenario", "title", "clauses"), rows
 

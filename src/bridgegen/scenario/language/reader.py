@@ -53,6 +53,7 @@ from bridgegen.scenario.language.tables import PackTable, read_table
 _PREFIX = re.compile(r"[a-z][a-z0-9_]{0,30}_")
 
 
+@cache
 def names(kind: str = "scenario") -> tuple[str, ...]:
     """Return the names of the scenarios (or, as ``kind``, the fragments) that ship."""
     folder = resources.files("bridgegen.scenario.catalogue")
@@ -66,6 +67,7 @@ def names(kind: str = "scenario") -> tuple[str, ...]:
     )
 
 
+@cache
 def pack_names() -> tuple[str, ...]:
     """Return the names of the scenarios of all packs that ship, each ``PACK/NAME``."""
     folder = resources.files("bridgegen.scenario.packs")
@@ -90,6 +92,7 @@ def pack_tables() -> Mapping[str, PackTable]:
     return {table.file.pack: table for table in tables}
 
 
+@cache
 def entry_names() -> tuple[str, ...]:
     """Return the names of the entries of all tables that ship, each ``PACK/NAME``."""
     return tuple(
@@ -123,12 +126,20 @@ def load(name_or_path: str | Path) -> LogicalScenario:
         FileFormatError: the file is missing, unreadable, too large, or no plain YAML.
         ScenarioError: it breaks rules; all of them, with file and line.
     """
-    pack, _, entry = str(name_or_path).partition("/")
+    text = str(name_or_path)
+    if not isinstance(name_or_path, Path) and text in (*names(), *pack_names()):
+        return _load_shipped(text)
+    pack, _, entry = text.partition("/")
     if not entry or (table := pack_tables().get(pack)) is None:
         return build(*document_of(name_or_path))
     if entry not in table.entries:
-        raise UnknownNameError("scenario", str(name_or_path), entry_names())
+        raise UnknownNameError("scenario", text, entry_names())
     return table.applied(entry, load(table.entries[entry][0]))
+
+
+@cache
+def _load_shipped(name: str) -> LogicalScenario:
+    return build(_read_shipped(name), None)
 
 
 def document_of(name_or_path: str | Path) -> tuple[Document, Path | None]:
