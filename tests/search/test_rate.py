@@ -15,8 +15,8 @@ from bridgegen.scenario.exposure import read_exposure
 from bridgegen.scenario.exposure.road import OnRoad
 from bridgegen.search.algorithms import Problem, Results
 from bridgegen.search.algorithms import rate as searching
-from bridgegen.search.algorithms.rate import Draws, Rate
-from bridgegen.search.triage.rates import Drawn, how_likely, row_weights
+from bridgegen.search.algorithms.rate import Draws, Rate, row_weights
+from bridgegen.search.triage.rates import Drawn, how_likely
 
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/cut-in-exposure.yaml"
 

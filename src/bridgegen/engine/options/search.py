@@ -383,7 +383,7 @@ class SearchOptions(CommonOptions):
         default=None,
         metadata=option(
             WHOLE,
-            "Number of evaluations, exactly; with --rate at most.",
+            "Number of evaluations, exactly.",
             shown="1000, or a distribution's test runs",
             limits=(1, MAX_BUDGET),
             group=SEARCH,
@@ -459,8 +459,8 @@ class SearchOptions(CommonOptions):
         default=None,
         metadata=option(
             SCREEN,
-            "Cheap simulator (low fidelity) beside a slow one, in which the algorithm searches for "
-            "what the simulator evaluates; not with --rate.",
+            "Cheap simulator (low fidelity) beside a slow one, in which the algorithm searches "
+            "for what the simulator evaluates; not with --rate.",
             shown="none",
             before=None,
             group=OF_SIMULATOR,

@@ -71,6 +71,13 @@ SURE = 4.0
 DOUBT = 1.25
 """By what deviations of a model are divided: models of a few hundred rows are too certain."""
 
+RAMP = 10.0
+"""Number of known critical rows with which a row counts half as much as one that is drawn last."""
+
+NARROW, LEAST_SHARE = 24.0, 0.6
+"""Effective number of failures from which on fewer rows make the rate precise, and the least part
+of the rows set aside for that: the others seek failures."""
+
 
 class Everywhere:
     """The road of a search without an exposure: the unit cube, uniformly; see `Road`."""
@@ -167,6 +174,26 @@ class _Model:
     likely: Float | None
 
 
+def row_weights(draws: Draws) -> Float:
+    """Return what each row adds to the estimate if it is harmful, ``(n,)``.
+
+    Batches count by their number of rows, and by the failures that were known before them: rows
+    that were drawn before there was a model vary most. Both are known when a batch is drawn, so
+    each batch is unbiased whatever the model.
+    """
+    counts = draws.known / (draws.known + RAMP)
+    if not counts.sum() > 0.0:
+        counts = np.ones(len(draws.known))
+    weights: Float = draws.weights * counts / counts.sum()
+    return weights
+
+
+def effective(parts: Float) -> float:
+    """Return as how many equal parts parts count: 0 where all are 0."""
+    # They are where failures were known only after the last batch was drawn.
+    return float(parts.sum()) ** 2 / max(float(np.sum(parts * parts)), 1e-300)
+
+
 class Rate:
     """Failures, and how often they happen, from one budget; see the module."""
 
@@ -184,7 +211,12 @@ class Rate:
         ),
         "road": Setting(0.25, "share of the rows that are drawn as on the road", 0.01, 0.5),
         "even": Setting(0.05, "share of the rows that are uniform over the ranges", 0.0, 0.25),
-        "rate": Setting(0.25, "share of the rows that make the rate precise", 0.0, 0.5),
+        "rate": Setting(
+            0.25,
+            "share of the rows that make the rate precise; less once many failures are known",
+            0.0,
+            0.5,
+        ),
         "apart": Setting(
             0.1,
             "distance kept from critical rows, as a share of the ranges, in root mean square",
@@ -231,12 +263,14 @@ class Rate:
         seek = self._seeker(pool, model, n) if model else None
         stated, base = as_road + evenly, blind
         if model and model.likely is not None:
-            stated += values["rate"]
+            hits = effective(row_weights(self.draws)[known.critical])
+            rate = values["rate"] * min(max(NARROW / max(hits, 1.0), LEAST_SHARE), 1.0)
+            stated += rate
             # Where harm is rare, what is hardly likely outweighs it on the road: half of these rows
             # go where it is likely in any case.
             for power in (1.0, SURE):
                 weights = pool.road * model.likely**power
-                base = base + 0.5 * values["rate"] * _shared(weights)
+                base = base + 0.5 * rate * _shared(weights)
         taken: list[int] = []
         chances, parts = np.empty(n), np.empty(n)
         for k in range(n):

@@ -6,17 +6,14 @@ from typing import Literal
 
 import numpy as np
 
-from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.base.arrays import Bool, Int
 from bridgegen.base.statistics import clopper_pearson, weighted_counts
 from bridgegen.scenario.exposure.exposure import Rate
-from bridgegen.search.algorithms.rate import Draws
+from bridgegen.search.algorithms.rate import Draws, effective, row_weights
 from bridgegen.search.triage.record import Frequency
 
 FEWEST_HITS = 12.0
 """Effective number of failures below which an interval is not believed."""
-
-RAMP = 10.0
-"""Number of known critical rows with which a row counts half as much as one that is drawn last."""
 
 UNSEEN = 3.0
 """Expected number of failures, none of which is seen with a probability of 5 %."""
@@ -43,20 +40,6 @@ class Drawn:
     left: int = 0
 
 
-def row_weights(draws: Draws) -> Float:
-    """Return what each row adds to the estimate if it is harmful, ``(n,)``.
-
-    Batches count by their number of rows, and by the failures that were known before them: rows
-    that were drawn before there was a model vary most. Both are known when a batch is drawn, so
-    each batch is unbiased whatever the model.
-    """
-    counts = draws.known / (draws.known + RAMP)
-    if not counts.sum() > 0.0:
-        counts = np.ones(len(draws.known))
-    weights: Float = draws.weights * counts / counts.sum()
-    return weights
-
-
 def how_likely(drawn: Drawn, happens: Bool) -> Frequency:
     """Return how likely an event is on the road, with a 95 % interval.
 
@@ -75,8 +58,7 @@ def how_likely(drawn: Drawn, happens: Bool) -> Frequency:
     road, low, high = float(draws.road.sum()), 0.0, min(UNSEEN / max(draws.road.sum(), 1e-9), 1.0)
     if not len(parts):
         return Frequency(estimate=0.0, low=low, high=high, hits=0.0)
-    # 0 where failures were known only after the last batch was drawn.
-    hits = float(parts.sum()) ** 2 / max(float(np.sum(parts * parts)), 1e-300)
+    hits = effective(parts)
     if hits < FEWEST_HITS:
         seen = float(np.sum((draws.road * draws.weights)[hit]))
         _, high = clopper_pearson(min(seen, road), road)
