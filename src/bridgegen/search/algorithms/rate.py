@@ -258,6 +258,8 @@ class Rate:
         n = max(values["batch"], int(values["growth"] * many)) if len(known) else values["initial"]
         pool = self._pool()
         as_road, evenly = values["road"], values["even"]
+        if not known.critical.any():  # where harm is rare, rows as on the road do not lead to it
+            evenly = as_road
         blind = as_road * _shared(pool.road) + evenly * _shared(pool.even)
         model = self._model(pool) if len(known) else None
         seek = self._seeker(pool, model, n) if model else None
