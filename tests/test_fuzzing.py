@@ -4,6 +4,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.thorough
+
 
 def test_mutated_files_are_read_or_refused():
     command = [sys.executable, str(Path(__file__).with_name("fuzzing.py"))]

@@ -309,6 +309,7 @@ AFTERWARDS = {"search-a-file": check_exports_of_a_searched_file}
 """What must hold once all of a page has run."""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", [name for name in PAGES if blocks(name)])
 def test_every_snippet_runs(name, page):
     page.as_printed, page.is_triaged = name in AS_PRINTED, name in TRIAGED

@@ -20,6 +20,8 @@ from bridgegen.jobs.search.run import Run
 from bridgegen.pages.thumbnails import read_thumbnails
 from bridgegen.scenario.participants import PARTICIPANTS
 
+pytestmark = pytest.mark.thorough
+
 GRID = {
     "scenarios": ["cut-in", "left-across-path"], "budget": 6, "seeds": 1, "keep": 1, "workers": 1,
 }  # fmt: skip

@@ -27,6 +27,8 @@ from bridgegen.results.store import Store
 from bridgegen.search.algorithms import ALGORITHMS, Problem, get
 from bridgegen.search.algorithms.algorithm import asynchronous
 
+pytestmark = pytest.mark.thorough
+
 RESULT = ("id", "batch", "U", "X", "metrics", "F", "status", "critical")
 
 

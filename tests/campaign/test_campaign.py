@@ -125,6 +125,7 @@ def test_metrics_that_are_asked_for_are_recorded_and_in_the_command(tmp_path):
     assert "--metrics d_min" in run.settings.command(run.folder)
 
 
+@pytest.mark.thorough
 def test_a_search_that_does_not_deliver_is_delivered_by_resuming(tmp_path):
     run = bg.run_search(
         "crossroads-s4",
@@ -317,6 +318,7 @@ def wait_for_rows(folder: Path, process: subprocess.Popen[str], count: int) -> N
     raise AssertionError(f"no {count} rows in time: {process.stderr and process.stderr.read()}")
 
 
+@pytest.mark.thorough
 def test_killed_and_resumed_is_as_if_undisturbed(tmp_path):
     undisturbed = bg.run_search(
         "crossroads-s4", budget=600, seed=3, keep=2, triage="none", out=tmp_path / "whole"
@@ -392,6 +394,7 @@ def test_on_a_map_the_roads_are_the_map_s(tmp_path):
     assert "lane_width" not in facts["parameters"]
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not TOWN05.exists(), reason="needs Town05.xodr")
 @pytest.mark.parametrize(
     ("scenario", "junction"),

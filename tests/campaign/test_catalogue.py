@@ -12,6 +12,8 @@ from bridgegen.jobs.search.validate import validate_file
 from bridgegen.results.store import Store
 from bridgegen.scenario.language.reader import load, names
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.parametrize("name", names())
 def test_a_smoke_search(tmp_path, name):

@@ -172,6 +172,7 @@ def test_a_driver_that_drives_nothing_is_not_tried_further():
     assert len(checks) == 5
 
 
+@pytest.mark.thorough
 def test_the_command_says_it_and_ends_with_a_status():
     run = CliRunner().invoke
     good = run(app, ["validate", f"{DRIVERS}:Cruises", "--scenario", CROSSROADS])

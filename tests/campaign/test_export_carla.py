@@ -20,6 +20,8 @@ from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.scenario.language.reader import load
 
+pytestmark = pytest.mark.thorough
+
 MM = 1e-3
 REFUSED = ("animal-on-road", "behind-the-corner", "door-opens")
 """CARLA has no animals, and nobody comes late there."""

@@ -15,6 +15,8 @@ from bridgegen.base.errors import FileFormatError, InputError, StorageError
 from bridgegen.jobs.credibility.convergence import Convergence
 from bridgegen.jobs.credibility.items import ASKED, CHAPTERS, FORM, ORACLES, SOURCES
 
+pytestmark = pytest.mark.thorough
+
 
 def items(found) -> dict:
     return {item.id: item for item in found.dossier.items}

@@ -24,6 +24,8 @@ from bridgegen.scenario.language.story import (
     Waypoint,
 )
 
+pytestmark = pytest.mark.thorough
+
 PAPERS = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")
 
 # Paper, Table II.

@@ -47,6 +47,7 @@ def test_every_scenario_that_is_named_ships_and_every_conflict_exists():
         assert all(kind.scenarios.values())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", CLAIMED)
 def test_a_scenario_has_conflicts_of_the_types_that_claim_it(name):
     """A driver that ignores traffic crashes in random rows in the way that each type is about."""

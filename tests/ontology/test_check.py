@@ -91,6 +91,7 @@ def test_what_is_no_number_breaks_the_rules_that_use_it(scenario, space, values,
             assert parity(scenario, space, row) == 1
 
 
+@pytest.mark.thorough
 def test_every_scenario_of_the_catalogue(space):
     for name in names():
         scenario = load(name)
@@ -376,6 +377,7 @@ def test_shapes_are_turtle_that_rdflib_reads_too(scenario):
     assert len(shapes) == len(rules(scenario))
 
 
+@pytest.mark.thorough
 def test_another_shacl_processor_agrees(scenario, values):
     """The same shapes over rdflib's own store and SPARQL engine, which share no code with ours."""
     import pyshacl

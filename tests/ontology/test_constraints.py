@@ -312,6 +312,7 @@ def test_rain_fog_and_night_limit_speed(weather):
         assert bool(told) == expected, free["speed_factor"]
 
 
+@pytest.mark.thorough
 def test_another_shacl_processor_blames_the_same():
     """The rules over rdflib's own store and SPARQL engine, which share no code with ours."""
     name = "red-light-runner"

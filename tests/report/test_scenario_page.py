@@ -23,6 +23,8 @@ from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.language.starter import start_scenario
 from bridgegen.simulation.embedded import portable
 
+pytestmark = pytest.mark.thorough
+
 SVG = "{http://www.w3.org/2000/svg}"
 
 

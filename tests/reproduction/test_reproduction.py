@@ -40,6 +40,8 @@ from bridgegen_reproduction.figures.look import DARK
 from bridgegen_reproduction.protocol import PRINTED
 from bridgegen_reproduction.runs import of
 
+pytestmark = pytest.mark.thorough
+
 COUNT = 3 * 2 * 2 + 3 * 2 * 2 + 2 * 2
 """Three methods without PPO, two scenarios, two seeds; again with perception; RS again, ideal."""
 

@@ -10,6 +10,8 @@ from tests.mining.events.truth import at_time, centres, encounter, some_rows
 
 from bridgegen.assess.metrics.times import pet
 
+pytestmark = pytest.mark.thorough
+
 NEAR, SHARED = 2.0, 10.0  # m
 BARELY = (1.0, 11.0)  # m; rows in which the shared part is as short are left out
 

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from tests.mining.events.simulated import compare, observed, simulated
 
+pytestmark = pytest.mark.thorough
+
 LENGTH = 4.6  # of a car
 
 

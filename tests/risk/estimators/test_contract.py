@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from bridgegen.jobs.risk.estimators.problem import Aim
 from bridgegen.jobs.risk.experiment import METHODS, estimate
 
+pytestmark = pytest.mark.thorough
+
 _spec = importlib.util.spec_from_file_location(
     "risk_problems", Path(__file__).with_name("problems.py")
 )
