@@ -132,7 +132,7 @@ def test_what_cannot_be_rated_is_refused(tmp_path):
 def test_it_ends_when_interval_and_modes_suffice(tmp_path, monkeypatch):
     monkeypatch.setattr(searcher, "LEAST_RATED", 60)
     given = {"ego": "route-follower", "exposure": EXAMPLE, "budget": 200, "triage": "none"}
-    settings = {"initial": 70, "precision": 0.9, "quiet": 0.05}
+    settings = {"initial": 70, "precision": 0.9}
     run = run_search("cut-in", settings=settings, out=tmp_path / "a", **given)
     rate = run.triage.rate
     assert (run.summary.evaluations + rate.left, run.finished) == (200, True)

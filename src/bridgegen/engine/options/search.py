@@ -363,7 +363,7 @@ class SearchOptions(CommonOptions):
         metadata=option(
             FLAG,
             "Also estimate how likely harm and each failure mode is; ends early when both the "
-            "interval and the modes suffice (settings precision, quiet).",
+            "interval and the modes suffice (--set precision).",
             before=False,
             group=SEARCH,
         ),

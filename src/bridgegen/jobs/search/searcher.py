@@ -148,8 +148,9 @@ def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
     return method(problem, settings.seed, **values)
 
 
-LEAST_RATED = 300
-"""Number of evaluations before which no search with rates ends, unless its budget does."""
+LEAST_RATED, QUIET = 300, 0.25
+"""Number of evaluations before which no search with rates ends, unless its budget does; and the
+share of them, the last ones, in which there was no new failure mode."""
 
 
 class Suffices:
@@ -178,7 +179,7 @@ class Suffices:
     def __call__(self) -> bool:
         """Return whether the rows so far suffice, by the algorithm's settings."""
         ran, values = self._algorithm, self._algorithm.values
-        if self._rows < LEAST_RATED or self._rows - self._at_last < values["quiet"] * self._rows:
+        if self._rows < LEAST_RATED or self._rows - self._at_last < QUIET * self._rows:
             return False
         n = len(ran.draws.U)
         found = how_likely(Drawn(ran.draws, np.arange(n), ran.road.share, ""), ran.critical)

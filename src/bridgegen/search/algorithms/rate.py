@@ -74,9 +74,9 @@ DOUBT = 1.25
 RAMP = 10.0
 """Number of known critical rows with which a row counts half as much as one that is drawn last."""
 
-NARROW, LEAST_SHARE = 24.0, 0.6
-"""Effective number of failures from which on fewer rows make the rate precise, and the least part
-of the rows set aside for that: the others seek failures."""
+LEAST_SHARE = 0.6
+"""Least part of the rows set aside for the rate that is used for it; the others seek failures. They
+become fewer from about a quarter of the failures on that the precision needs."""
 
 
 class Everywhere:
@@ -230,9 +230,6 @@ class Rate:
             0.0,
             1.0,
         ),
-        "quiet": Setting(
-            0.25, "share of the rows without a new failure mode before it ends", 0.05, 0.95
-        ),
     }
     objectives: ClassVar[Arity] = "one"
 
@@ -266,7 +263,8 @@ class Rate:
         stated, base = as_road + evenly, blind
         if model and model.likely is not None:
             hits = effective(row_weights(self.draws)[known.critical])
-            rate = values["rate"] * min(max(NARROW / max(hits, 1.0), LEAST_SHARE), 1.0)
+            part = 1.0 / max(hits * values["precision"] ** 2, 1e-9)
+            rate = values["rate"] * min(max(part, LEAST_SHARE), 1.0)
             stated += rate
             # Where harm is rare, what is hardly likely outweighs it on the road: half of these rows
             # go where it is likely in any case.
