@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 from collections.abc import Mapping
 from csv import writer
 from dataclasses import dataclass
@@ -177,8 +176,6 @@ class Risk:
     def rate(self, name: str, unit: str) -> Rate | None:
         """Return how often an event happens per hour or km; None where that is not known.
 
-        The intervals of both factors are combined as if their logarithms were independent.
-
         Args:
             name: of the event.
             unit: "h" or "km".
@@ -187,15 +184,7 @@ class Risk:
         each = None if met is None else met.per_hour if unit == "h" else met.per_km
         if each is None or p is None:
             return None
-        estimate = each.estimate * p.estimate
-        # An end of 0 has no logarithm; the upper ends multiply, which holds in any case.
-        if not (estimate > 0.0 and each.low > 0.0 and p.low > 0.0):
-            return Rate(estimate, 0.0, each.high * p.high)
-        # Both factors are positive and skewed: their logarithms add, and so do the squares of the
-        # distances.
-        low = math.hypot(math.log(each.estimate / each.low), math.log(p.estimate / p.low))
-        high = math.hypot(math.log(each.high / each.estimate), math.log(p.high / p.estimate))
-        return Rate(estimate, estimate * math.exp(-low), estimate * math.exp(high))
+        return each.of_which(p.estimate, p.low, p.high)
 
     @cached_property
     def parameters(self) -> tuple[ParameterShare, ...]:

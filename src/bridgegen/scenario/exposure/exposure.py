@@ -65,6 +65,26 @@ class Rate:
         """Return it with its interval, per a unit."""
         return f"{self.estimate:.3g} per {unit} (95 %: {self.low:.3g} to {self.high:.3g})"
 
+    def of_which(self, p: float, low: float, high: float) -> "Rate":
+        """Return how often an event happens that each has with a probability.
+
+        The intervals of both factors are combined as if their logarithms were independent.
+
+        Args:
+            p: the probability.
+            low: lower end of its interval.
+            high: its upper end.
+        """
+        estimate = self.estimate * p
+        # An end of 0 has no logarithm; the upper ends multiply, which holds in any case.
+        if not (estimate > 0.0 and self.low > 0.0 and low > 0.0):
+            return Rate(estimate, 0.0, self.high * high)
+        # Both factors are positive and skewed: their logarithms add, and so do the squares of the
+        # distances.
+        below = math.hypot(math.log(self.estimate / self.low), math.log(p / low))
+        above = math.hypot(math.log(self.high / self.estimate), math.log(high / p))
+        return Rate(estimate, estimate * math.exp(-below), estimate * math.exp(above))
+
 
 def poisson_interval(count: int, level: float = LEVEL) -> tuple[float, float]:
     """Return the exact two-sided interval for the mean of a Poisson distribution.
