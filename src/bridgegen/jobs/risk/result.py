@@ -15,8 +15,10 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.risk.cross_simulator import Elsewhere
+from bridgegen.jobs.risk.estimators.total import DRAWS
 from bridgegen.jobs.risk.estimators.weighted import FEWEST_HITS, Probability, Weighted
 from bridgegen.jobs.risk.experiment import Estimated
+from bridgegen.jobs.risk.extremes import Extreme, of_near_misses
 from bridgegen.jobs.risk.options import FIGURES, WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS, INJURY, Column, DataBand
 from bridgegen.scenario.exposure import Exposure
@@ -200,6 +202,16 @@ class Risk:
         ]
         return tuple(sorted(found, key=lambda share: -share.distance))
 
+    def draws(self, name: str, random: np.random.Generator) -> tuple[Float, ...]:
+        """Return draws of an event's probability, see `Weighted.draws`."""
+        return self.weighted.draws(self._values(name), random, DRAWS)
+
+    @cached_property
+    def extreme(self) -> Extreme | None:
+        """How likely a collision is by near misses; None if no row was drawn as on the road."""
+        road = self.weighted.road
+        return of_near_misses(road[:, Column.TTC], self.seed) if road.size else None
+
     def to_dict(self) -> dict[str, Any]:
         """Return what ``risk.json`` says."""
         exposure, weighted = self.exposure, self.weighted
@@ -247,6 +259,7 @@ class Risk:
                 for likely in self.most_likely
             ],
             "diagnostics": weighted.facts,
+            "near_misses": None if self.extreme is None else self.extreme.to_dict(),
             "check": None
             if self.check is None
             else {
@@ -283,6 +296,7 @@ class Risk:
             for unit, words in (("h", "hour"), ("km", "km")):
                 rate = self.rate(name, unit)
                 found[f"{name}_per_{words}"] = nan if rate is None else rate.estimate
+                found[f"{name}_per_{words}_upper"] = nan if rate is None else rate.high
         name, method = self.exposure.scenario.name, self.estimated.method
         return (
             Judged(
@@ -348,6 +362,8 @@ class Risk:
 
     def _finding(self, values: Float) -> Finding:
         hits, weighted = self.weighted.hits(values), self.weighted
+        if self.failed >= weighted.evaluations:
+            return Finding(None, hits, f"none of {self.failed:,} simulations has a result")
         if weighted.doubts:  # of the aim; what comes with it is no surer
             return Finding(None, hits, weighted.doubts[0])
         counted = bool(weighted.rows) and (
