@@ -17,8 +17,9 @@ BATCH = 8
 EACH = 20
 """Default number of rows of the screen for each row of the run's simulator."""
 
-LEAST_EACH = 5
-"""Least number of them in a search with rates: batches are drawn of pools that are as large."""
+EACH_RATED, LEAST_EACH = 100, 20
+"""Default and least number of them in a search with rates. Each batch is drawn of a pool of so many
+points for each row: rows of a small pool are not independent, and intervals are too narrow."""
 
 
 def require_screen(given: SearchOptions, budget: int) -> None:
@@ -75,7 +76,7 @@ def screen_budget(given: SearchOptions, budget: int) -> int | None:
     """Return the screen's budget, given or default; None without a screen."""
     if given.screen is None or given.screen_budget is not None:
         return given.screen_budget
-    return min(EACH * budget, MAX_BUDGET)
+    return min((EACH_RATED if given.rate else EACH) * budget, MAX_BUDGET)
 
 
 def screen_batch(given: SearchOptions) -> int | None:

@@ -315,10 +315,10 @@ class Rate:
         """Return a new pool for a batch of n rows."""
         screen, many = self._problem.screen, POOL
         if screen is not None:
-            # By the numbers of rows alone. More could happen than expected: the last points of all
-            # are beyond the budget then, and the screen says nothing of them.
-            due = int(screen.each * (len(self.draws.U) + n)) - screen.evaluations
-            many = min(max(due, 2 * n, LEAST_POOL), POOL)
+            # By earlier rows alone. If more points can happen than expected, the last ones are
+            # beyond the screen's budget, and it says nothing of them.
+            due = min(int(screen.each * (self._known.different + n)), screen.budget)
+            many = min(max(due - screen.evaluations, 2 * n, LEAST_POOL), POOL)
         rng, road, known = self._rng, self.road, self._known
         best = np.argsort(known.F, kind="stable")[:BEST]
         bases = self.draws.Z[np.union1d(known.distinct[-FOUND:], best)]
