@@ -537,7 +537,7 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
         road_end=given.road_end,
         roads=roads,
         story=story,
-        driver=given.driver,
+        driver="" if given.driver == "storyboard" else given.driver,
         effects=tuple(effect.function for effect in given.effects),
         axes=read_axes(given.axes),
         parameters=parameters,
