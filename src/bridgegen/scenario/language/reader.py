@@ -16,6 +16,7 @@ from bridgegen.scenario.language.adversary import DRIVERS, SCRIPTED, driven
 from bridgegen.scenario.language.checks import NEEDED, time_problems, try_out, use_problems
 from bridgegen.scenario.language.constraints import problems_of
 from bridgegen.scenario.language.criteria import read_criteria_in, unknown_entities
+from bridgegen.scenario.language.dsl.story import read_dsl
 from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.kinds import FLOAT, KEYS, KINDS, Kind
 from bridgegen.scenario.language.objectives import HARM, PAPERS, read_objective
@@ -49,6 +50,9 @@ from bridgegen.scenario.language.schema_types import Section, section, shape_pro
 from bridgegen.scenario.language.story import Story
 from bridgegen.scenario.language.storyboard import Storyboard, read_recorded
 from bridgegen.scenario.language.tables import PackTable, read_table
+
+DSL = ".osc"
+"""Ending of the names of OpenSCENARIO DSL files."""
 
 _PREFIX = re.compile(r"[a-z][a-z0-9_]{0,30}_")
 
@@ -154,6 +158,8 @@ def document_of(name_or_path: str | Path) -> tuple[Document, Path | None]:
     """
     text = str(name_or_path)
     path = Path(text)
+    if path.suffix.lower() == DSL:
+        return read_dsl(path), path.parent
     is_path = isinstance(name_or_path, Path) or path.suffix in (".yaml", ".yml")
     # A name with a slash is a pack's only where there is such a pack; any other one is a path, and
     # the message says that the file is missing.
@@ -550,6 +556,7 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
         recorded=recorded,
         domain=document.below("odd") if given.odd else None,
         exposure=document.below("exposure") if given.exposure is not None else None,
+        notes=document.notes,
     )
     try_out(scenario)
     return scenario

@@ -175,6 +175,8 @@ def build(
     if odd:
         put(builder.iri(EGO), "has_odd", odd)
     for event in story.events:
+        if driver and event.participant == EGO:
+            continue  # the driver decides
         put(top, "has_event", add_event(builder, event, declared, place))
     for name, course in (courses or {}).items():
         put(top, "has_event", add_course(builder, name, course))

@@ -6,6 +6,7 @@ known without a file; of types that a file declares, fields are known as well.
 
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -50,13 +51,13 @@ ACTORS: Mapping[str, str] = MappingProxyType(
 
 _DOMAIN = frozenset(
     """int uint float bool string mass temperature pressure jerk angular_rate angular_acceleration
-    luminous_intensity illuminance electrical_current amount_of_substance position_3d pose_3d
-    orientation_3d route_point odr_point xyz_point path_point path route trajectory map environment
-    weather color directionality vehicle_category bounding_box axle osc_actor physical_object
-    stationary_object movable_object traffic_participant person animal pedestrian driving_direction
-    lane lane_section junction crossing road side_left_right env Path hour speed_type
+    luminous_intensity illuminance position_3d pose_3d orientation_3d route_point odr_point
+    xyz_point path_point path route trajectory map environment env weather color directionality
+    vehicle_category bounding_box axle osc_actor physical_object stationary_object movable_object
+    traffic_participant person animal pedestrian lane junction crossing road
     """.split()
 ) | {*QUANTITIES, *ACTORS}
+_COLOURS = {"white", "silver", "gray", "black", "red", "yellow", "green", "blue", "brown"}
 _SI = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
 
 
@@ -153,7 +154,10 @@ class Names:
         return earlier is not None
 
     def _declare(self, node: Node) -> None:
-        name, known = node.name, self.types.get(node.name)
+        name = node.name
+        if node.more.get("of") and node.kind == "modifier":
+            name = f"{name} of {node.more['of']}"
+        known = self.types.get(name)
         if node.kind in ("type", "unit"):
             self._physical(node)
         elif node.kind == "enum" or node.more.get("values"):
@@ -167,7 +171,7 @@ class Names:
                 self._take(known, node.part("members"))
         elif not self._again(name, node, known.node if known else None):
             base, found = str(node.more["base"]), Type(node)
-            actor, dot, short = name.rpartition(".")
+            actor, dot, short = node.name.rpartition(".")
             of = self.types.get(actor)
             if dot and (of.node.kind != "actor" if of else actor not in _DOMAIN):
                 self._refuse(f"a behaviour is of an actor, and no actor '{actor}' is declared", node)
@@ -266,7 +270,7 @@ class Names:
                     self._check_types(node)
                 elif node.kind == "enum_value":
                     self._check_value(node)
-                elif node.kind == "number" and node.name and self.factor(node.name) is None:
+                elif node.kind == "number" and node.name and self.unit(node.name) is None:
                     self._refuse(f"no unit '{node.name}' is declared", node)
                 elif node.kind in (*COMPOSITIONS, "drive", "wait") and node.name:
                     if not self._again(node.name, node, labels.get(node.name)):
@@ -287,7 +291,7 @@ class Names:
 
     def _check_keep(self, keep: Node, found: Type, it: Type | None) -> None:
         """Check the names that a constraint reads: its fields, and those of their types."""
-        values = {value for each in self.enums.values() for value in each} | {"silver"}
+        values = {value for each in self.enums.values() for value in each} | _COLOURS
         inner = {id(node.items[0]) for node in keep.every() if node.kind == "member_of"}
         for node in keep.every():
             root = node.items[0] if node.kind == "member_of" else node
@@ -311,17 +315,14 @@ class Names:
 
     # -- values ------------------------------------------------------------------------------------
 
-    def factor(self, unit: str) -> float | None:
-        """Return what a unit is in the unit of its `QUANTITIES`; None if there is none."""
-        if unit in UNITS and UNITS[unit] in ("deg", "rad"):
-            return in_unit(f"1 {UNITS[unit]}", "deg")  # files state that factor either way round
-        if unit in self.units:
-            return self.units[unit][1]
-        for known in ("s", "m", "m/s", "m/s²"):
-            try:
-                return in_unit(f"1 {UNITS.get(unit, '')}", known)
-            except ValueError:
-                continue
+    def unit(self, name: str) -> tuple[str, float] | None:
+        """Return the unit that a unit is simulated in, and its factor; None if there is none."""
+        of, factor, _ = self.units.get(name, ("", 1.0, None))
+        if name in self.units and QUANTITIES.get(of) != "deg":  # files turn that factor round
+            return QUANTITIES.get(of, of), factor
+        for unit in dict.fromkeys(QUANTITIES.values()):
+            with suppress(ValueError):
+                return unit, in_unit(f"1 {UNITS.get(name, '?')}", unit)
         return None
 
     def number(self, node: Node) -> float | None:
