@@ -15,6 +15,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+import numpy as np
+
+from bridgegen.base.arrays import Float
 from bridgegen.base.errors import ScenarioError, UnsupportedError
 from bridgegen.scenario.language.dsl.names import ACTORS, QUANTITIES, Names, Type
 from bridgegen.scenario.language.dsl.parser import COMPOSITIONS, Node
@@ -33,6 +36,9 @@ FREE = (8.0, 14.0)
 OPEN_PHASE = 10.0
 """Duration of a phase that states none [s]; ours."""
 
+SAMPLE = 512
+"""Rows on which amounts are tried: what a road must hold, and which speeds there are."""
+
 _EGOS = ("ego", "ego_vehicle", "sut", "dut")
 _LIMITS = {"<": "hi", "<=": "hi", ">": "lo", ">=": "lo"}
 _FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
@@ -43,39 +49,42 @@ _CONDITIONS = {
 
 
 class Amount(NamedTuple):
-    """A number, or a formula of parameters, with the values that it can take."""
+    """A number, or a formula of parameters, with its values in a sample of rows.
+
+    Attributes:
+        text: the formula.
+        values: ``(SAMPLE,)`` float64; the first is that at the defaults.
+    """
 
     text: str
-    low: float
-    high: float
-    usual: float
+    values: Float
+
+    low = property(lambda self: float(self.values.min()))
+    high = property(lambda self: float(self.values.max()))
+    usual = property(lambda self: float(self.values[0]))
+    fixed = property(lambda self: bool((self.values == self.values[0]).all()))
 
     @property
     def value(self) -> float | str:
-        """The number; the name of a parameter or derived quantity."""
-        return round(self.usual, 9) if self.low == self.high else self.text
+        """The number; the name of a parameter or derived quantity, or its formula."""
+        return round(self.usual, 9) if self.fixed else self.text
 
 
 def number(value: float) -> Amount:
     """Return a number."""
-    return Amount(repr(round(value, 9)), value, value, value)
+    return Amount(repr(round(value, 9)), np.full(SAMPLE, value))
 
 
 def combined(sign: str, a: Amount, b: Amount) -> Amount:
-    """Return the sum, difference, product or quotient of two amounts; inf where none exists."""
-    work: Callable[[float, float], float] = {
-        "+": lambda x, y: x + y,
-        "-": lambda x, y: x - y,
-        "*": lambda x, y: x * y,
-        "/": lambda x, y: x / y if y else math.inf,
-    }[sign]
-    ends = [work(x, y) for x in (a.low, a.high) for y in (b.low, b.high)]
-    usual = work(a.usual, b.usual)
-    if a.low == a.high and b.low == b.high:
-        return number(usual)
-    if (sign in "+-" and b.low == b.high == 0.0) or (sign in "*/" and b.low == b.high == 1.0):
+    """Return the sum, difference, product or quotient of two amounts; not finite where none is."""
+    work = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}[sign]
+    with np.errstate(all="ignore"):
+        values = work(a.values, b.values)
+    if a.fixed and b.fixed:
+        return Amount(repr(round(float(values[0]), 9)), values)
+    if b.fixed and b.usual == (0.0 if sign in "+-" else 1.0):
         return a
-    return Amount(f"({a.text} {sign} {b.text})", min(ends), max(ends), usual)
+    return Amount(f"({a.text} {sign} {b.text})", values)
 
 
 ZERO = number(0.0)
@@ -138,10 +147,12 @@ class _Story:
         self._lines: dict[tuple[str | int, ...], int] = {}
         self._notes: list[str] = []
         self._values: dict[tuple[str, str], Amount] = {}
-        self._lanes, self._junction, self._depth = 1, False, 0
+        self._lanes, self._junction, self._depth = 1, 0.0, 0
         self._guards: list[str] = []
+        self._rows: dict[str, Any] = {}
         self._since: tuple[list[dict[str, Any]], Amount, str] | None = None
         self._highest = 0.0
+        self._random = np.random.default_rng(0)  # which rows are tried; no scenario depends on it
 
     # -- the document ------------------------------------------------------------------------------
 
@@ -214,7 +225,7 @@ class _Story:
         lane = actor.first_lane or self._lanes
         at = combined("+", begin, place)
         if self._junction:
-            start = {"leg": "A", "way": "in", "lane": lane, "distance": self._named(combined("-", number(length / 2.0), at), f"{key}_start", "m", actor.node)}
+            start = {"leg": "A", "way": "in", "lane": lane, "distance": self._named(combined("-", number(self._junction + begin.usual), at), f"{key}_start", "m", actor.node)}
             end = {"leg": "C", "way": "out", "lane": lane, "distance": length - 10.0}
         else:
             start = {"lane": lane, "distance": self._named(at, f"{key}_start", "m", actor.node)}
@@ -289,11 +300,14 @@ class _Story:
         source = f"{node.place}."
         self._parameters[name] = {"axis": "participants", "unit": unit, "low": low, "high": high, "default": usual, "description": said, "source": source, **more}
         self._lines[("parameters", name)] = node.line
-        return Amount(name, low, high, usual)
+        shares = self._random.choice([0.0, 1.0, 0.25, 0.5, 0.75], SAMPLE, p=[0.3, 0.3, 0.1, 0.2, 0.1])
+        values = low + shares * (high - low)
+        values[0] = usual
+        return Amount(name, values)
 
     def _named(self, amount: Amount, name: str, unit: str, node: Node) -> float | str:
         """Return an amount as a scenario file holds it; a formula becomes a derived quantity."""
-        if not all(map(math.isfinite, amount[1:])):
+        if not np.isfinite(amount.values).all():
             self._refuse(f"{name.replace('_', ' ')} has no finite value", node)
         value = amount.value
         if isinstance(value, float) or value in self._parameters or value in self._derived:
@@ -329,7 +343,7 @@ class _Story:
             return number(value * found[1])
         if node.kind == "range":
             low, high = (self._amount(item, scope, unit, name) for item in node.items)
-            if low.low != low.high or high.low != high.high:
+            if not (low.fixed and high.fixed):
                 self._refuse("the ends of a range are numbers", node)
             more = {} if unit else {"kind": "integer", "usual": math.floor(0.5 * (low.low + high.low))}
             return self._parameter(name, unit or "1", low.low, high.high, node, **more)
@@ -377,7 +391,7 @@ class _Story:
                 limits[_LIMITS[sign]] = self._amount(other, scope, unit, name)
             else:
                 self._refuse(f"keep() limits a field by ==, <, <=, >, >= or a range, got '{sign}'", other)
-        ends = [side.low for side in limits.values() if side.low == side.high]
+        ends = [side.low for side in limits.values() if side.fixed]
         if value is None and len(limits) == 2 and len(ends) == 2:
             return self._limited(name, unit, limits["lo"].low, limits["hi"].high, usual, declared, scope)
         if value is None and usual is not None and not limits:
@@ -527,6 +541,9 @@ class _Story:
             "description": "Alternative of the one_of that happens.", "source": f"{node.place}.",
         }  # fmt: skip
         self._lines[("parameters", choice)] = node.line
+        chosen = self._random.integers(0, len(options), SAMPLE)
+        chosen[0] = 0
+        self._rows |= {f"{choice} == {option}": chosen == k for k, option in enumerate(options)}
         before, ends, after = deepcopy(self._actors), [], []
         for option, member in zip(options, members, strict=True):
             self._actors = deepcopy(before)
@@ -565,15 +582,16 @@ class _Story:
             self._actors[name] = merged
         return end
 
-    @staticmethod
-    def _chosen(choice: str, options: Sequence[str], amounts: Sequence[Amount]) -> Amount:
+    def _chosen(self, choice: str, options: Sequence[str], amounts: Sequence[Amount]) -> Amount:
         """Return the amount of the alternative that a category chooses."""
+        found = amounts[-1]
         if len({amount.text for amount in amounts}) == 1:
-            return amounts[0]
-        text = amounts[-1].text
+            return found
         for option, amount in zip(options[-2::-1], amounts[-2::-1], strict=True):
-            text = f"({amount.text} if {choice} == {option} else {text})"
-        return Amount(text, min(a.low for a in amounts), max(a.high for a in amounts), amounts[0].usual)
+            guard = f"{choice} == {option}"
+            values = np.where(self._rows[guard], amount.values, found.values)
+            found = Amount(f"({amount.text} if {guard} else {found.text})", values)
+        return found
 
     def _ended(self, happens: Node, scope: Scope, start: Amount, length: Amount | None, actor: Actor | None, name: str) -> Amount:
         """Return when a wait or an until ends."""
@@ -610,11 +628,11 @@ class _Story:
             if later.value == 0.0:
                 self._since = conditions, base, marker or name
                 return [dict(each) for each in conditions]
-            if not marker or later.low != later.high:
+            if not marker or not later.fixed:
                 self._refuse("after 'until', what follows begins at once or a fixed time later", node)
             return [{"kind": "began", "event": marker, "value": round(later.usual, 9)}]
         for guard in self._guards:
-            time = Amount(f"({time.text} if {guard} else {NEVER})", time.low, NEVER, time.usual)
+            time = Amount(f"({time.text} if {guard} else {NEVER})", np.where(self._rows[guard], time.values, NEVER))
         return [{"kind": "time", "value": self._named(time, f"{name}_time", "s", node)}]
 
     # -- drive() -----------------------------------------------------------------------------------
@@ -658,7 +676,7 @@ class _Story:
             gone = combined("+", gone, combined("*", combined("-", before, speed), combined("/", within, number(2.0))))
         elif before.text != speed.text:
             gain = combined("-", speed, before)
-            size = number(abs(gain.usual)) if gain.low == gain.high else Amount(f"abs({gain.text})", 0.0, max(abs(gain.low), abs(gain.high)), abs(gain.usual))
+            size = number(abs(gain.usual)) if gain.fixed else Amount(f"abs({gain.text})", np.abs(gain.values))
             gone = combined("-", gone, combined("/", combined("*", gain, size), number(2.0 * RATE)))
         return combined("+", at, gone)
 
@@ -764,8 +782,13 @@ class _Story:
             self._lines[("events", event)] = node.line
             second = begins.pop("then", None)
             self._events[event] = {"participant": actor.name, **begins, "when": self._when(start, node, event)}
-            for number_, (time, change) in enumerate(second or (), 2):
-                self._events[f"{event}_{number_}"] = {"participant": actor.name, "lane_change": change, "when": self._when(time, node, f"{event}_{number_}")}
+            for number_, (k, guard, rows, change) in enumerate(second or (), 1):
+                self._rows[guard] = rows
+                self._guards.append(guard)
+                later = combined("+", start, number(number_ * change["time"]))
+                when = self._when(later, node, f"{event}_{k}")
+                self._guards.pop()
+                self._events[f"{event}_{k}"] = {"participant": actor.name, "lane_change": change, "when": when}
 
     def _target(
         self, actor: Actor, member: Node, given: Mapping[str, Node], scope: Scope, time: Amount,
@@ -823,8 +846,13 @@ class _Story:
             else:
                 speed = combined("-", combined("*", number(2.0), mean), before)
                 speed, within = self._short(speed, f"{name}_speed", "m/s", asked["position end"][0]), length
-            if speed.low < 0.0 or before.low < 0.0:
-                self._refuse(f"{actor.name} would drive backwards at {min(speed.low, before.low):.3g} m/s to be there", asked["position end"][0])
+            if speed.high < 0.0:
+                self._refuse(f"{actor.name} would drive backwards at {speed.low:.3g} m/s to be there", asked["position end"][0])
+            if speed.low < 0.0:
+                self._notes.append(f"{actor.name} cannot be there in every row: it does not drive backwards")
+                speed = Amount(f"max({speed.text}, 0)", np.maximum(speed.values, 0.0))
+                speed = self._short(speed, f"{name}_speed", "m/s", asked["position end"][0])
+                before = speed if within is None else before
             return before, speed, within
         if before is None and (at_end is None or change or rate):
             other = next((given for key, (_, given) in asked.items() if key == "position all"), {})
@@ -887,23 +915,17 @@ class _Story:
             self._refuse(f"{actor.name} cannot change {count.low:g} lanes to the {side}: it is on lane {now} of {self._lanes}", member)
         if count.high > room:
             self._notes.append(f"{name}: change_lane() by {count.low:g} to {count.high:g} lanes is by {room} at most, there are no more lanes")
-            if count.low < room:
-                self._parameters[count.text]["high"] = float(room)
-                self._parameters[count.text]["default"] = float(min(room, count.usual))
-                count = count._replace(high=float(room), usual=min(room, count.usual))
-            else:
-                count = number(float(room))
+            count = Amount(f"min({count.text}, {room})", np.minimum(count.values, room))
         sign, most = (1 if side == "left" else -1), int(count.high)
         takes = self._takes(length)
         begins["lane_change"] = {"lanes": sign * int(count.low), "time": takes}
         if count.low < most:
             if isinstance(takes, str):
                 self._refuse("a range of lanes needs a phase of constant duration", member)
-            begins["lane_change"]["time"] = takes / (most - count.low + 1)
-            start = self._names and begins["lane_change"]["time"]
+            takes = begins["lane_change"]["time"] = takes / (most - count.low + 1)
             begins["then"] = [
-                (Amount(f"({self._start.text} + {start * k} if {count.text} >= {count.low + k} else {NEVER})", 0.0, NEVER, 0.0), {"lanes": sign, "time": start})
-                for k in range(1, most - int(count.low) + 1)
+                (k, f"{count.text} >= {k}", count.values >= k, {"lanes": sign, "time": takes})
+                for k in range(int(count.low) + 1, most + 1)
             ]
         actor.lane = now - sign * most
 
@@ -922,7 +944,7 @@ class _Story:
         by = 1
         if "" in given:
             count = self._amount(given[""], scope, "", f"{actor.name}_lane")
-            if count.low != count.high:
+            if not count.fixed:
                 self._refuse("a lane is one number, not a range: use one_of", member)
             by = int(count.low)
         if side is None:
@@ -956,7 +978,8 @@ class _Story:
             elif kind == "path_min_driving_lanes" and arguments:
                 self._lanes = max(self._lanes, int(self._amount(arguments[0].items[0], scope, "", "lanes").high))
             elif kind == "path_over_junction":
-                self._junction = True
+                before = next((each.items[0] for each in arguments if each.name == "distance_before"), None)
+                self._junction = self._amount(before, scope, "m", "distance_before").usual if before else 100.0
                 self._notes.append("path_over_junction(): the template crossroads stands for the junction")
             elif kind == "set_position":
                 self._notes.append(f"set_position() in line {member.line} is a place on that map: it starts on the template road")
