@@ -174,7 +174,9 @@ class Names:
             actor, dot, short = node.name.rpartition(".")
             of = self.types.get(actor)
             if dot and (of.node.kind != "actor" if of else actor not in _DOMAIN):
-                self._refuse(f"a behaviour is of an actor, and no actor '{actor}' is declared", node)
+                self._refuse(
+                    f"a behaviour is of an actor, and no actor '{actor}' is declared", node
+                )
             if node.kind in ("scenario", "action") and short in (actor, *self._of("actor")):
                 self._refuse(f"a behaviour is not called as an actor, got '{short}'", node)
             if base:
@@ -229,7 +231,9 @@ class Names:
         else:
             factor = self.number(parts["factor"].items[0]) if "factor" in parts else 1.0
             if factor is None or factor <= 0.0 or not math.isfinite(factor):
-                self._refuse(f"the factor of a unit is a number above 0, '{name}' has another", node)
+                self._refuse(
+                    f"the factor of a unit is a number above 0, '{name}' has another", node
+                )
             self.units[name] = of, factor or 1.0, node
 
     def _enum(self, node: Node) -> None:
@@ -251,7 +255,9 @@ class Names:
                     f"got {value}",
                     member,
                 )
-            last = value if value is not None else -1 + len(values) + 1 if last is None else last + 1
+            last = (
+                value if value is not None else -1 + len(values) + 1 if last is None else last + 1
+            )
             values.append(member.name)
 
     # -- what refers to names ----------------------------------------------------------------------
