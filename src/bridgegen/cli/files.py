@@ -214,7 +214,7 @@ def validate(
         list[str] | None,
         typer.Argument(
             metavar="FILE",
-            help="Files: .owl, .xodr, .xosc or .yaml; or drivers of your own: module:Class, "
+            help="Files: .owl, .xodr, .osc, .xosc or .yaml; or drivers of your own: module:Class, "
             "file.py:Class, file.py:function, file.fmu, connect:HOST:PORT, unix:PATH, "
             "'exec:COMMAND'.",
             show_default=False,

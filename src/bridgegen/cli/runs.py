@@ -251,7 +251,8 @@ def new(
     like: Annotated[
         str | None,
         typer.Option(
-            help="Start from a copy of this catalogue scenario.",
+            help="Start from a copy of this catalogue scenario, or from this OpenSCENARIO DSL file "
+            "(.osc), as YAML.",
             autocompletion=completing("scenario"),
         ),
     ] = None,
@@ -309,7 +310,7 @@ def simulate(
     scenario: Annotated[
         str,
         typer.Argument(
-            help="An OpenSCENARIO file (.xosc); or a catalogue name or the path of a YAML file, of "
+            help="An OpenSCENARIO file (.xosc); or a catalogue name, a YAML or .osc file, of "
             "which one row is simulated.",
             autocompletion=completing("scenario"),
         ),

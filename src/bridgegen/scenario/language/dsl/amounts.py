@@ -88,6 +88,8 @@ def _joined(sign: str, a: Amount, other: Amount | float) -> Amount:
     b = number(other) if isinstance(other, float) else other
     with np.errstate(all="ignore"):
         values = _WORK[sign](a.values, b.values)
+    if sign == "+" and a.text == "0.0":
+        return b
     is_same = b.fixed and b.low == (0.0 if sign in "+-" else 1.0)
     return a if is_same else _made(f"({a.text} {sign} {b.text})", values)
 
@@ -138,7 +140,7 @@ class Amounts:
         return next(n for n in tried if n not in taken["parameters"] and n not in taken["derived"])
 
     def _declare(self, section: str, name: str, node: Node, **more: Any) -> None:
-        source = {"axis": "participants", "source": f"{node.place}."}
+        source = {"axis": "participants", "source": node.source}
         self.sections[section][name] = {**source, "description": f"{name}, of the file.", **more}
         self.lines[(section, name)] = node.line
 
@@ -224,10 +226,8 @@ class Amounts:
                 left, right = node.items
                 flips = node.name == "*" and left.kind == "number" and not left.name
                 units = (unit, unit) if node.name in "+-" else ("", unit) if flips else (unit, "")
-                a, b = (
-                    self.amount(*each, name) for each in zip((left, right), (scope,) * 2, units)
-                )
-                return _joined(node.name, a, b)
+                a = self.amount(left, scope, units[0], name)
+                return _joined(node.name, a, self.amount(right, scope, units[1], name))
             case "name", _:
                 return self._field(node, scope, unit)
         refuse(f"{name} cannot be a {node.kind.replace('_', ' ')}", node)
@@ -254,32 +254,40 @@ class Amounts:
         self._known = {key: value for key, value in self._known.items() if key[0] != of}
 
     def _limited(self, name: str, declared: Node, scope: Scope, unit: str) -> Amount:
-        value, usual, limits = declared.more["value"], None, {}
+        value, usual = declared.more["value"], None
+        ends: dict[str, float] = {}
+        bounds: list[tuple[str, Amount]] = []
         for sign, other, strength in _kept(name, declared, scope):
+            side = _LIMITS.get(sign, "")
             if sign == "==" and strength == "default":
                 usual = self.amount(other, scope, unit, name)
             elif sign == "==" or (sign == "in" and other.kind == "range"):
                 value = other
-            elif sign in _LIMITS:
-                limits[_LIMITS[sign]] = self.amount(other, scope, unit, name)
-            else:
+            elif not side:
                 refuse("keep() limits a field by ==, <, <=, >, >= or to a range", other)
+            elif (limit := self.amount(other, scope, unit, name)).fixed:
+                nearer = max if side == "lo" else min
+                ends[side] = nearer(ends.get(side, limit.low), limit.low)
+            else:
+                bounds.append((side, limit))
         default = usual.low if usual is not None and usual.fixed else None
-        if value is None and len(limits) == 2 and all(limit.fixed for limit in limits.values()):
-            low, high = limits["lo"].low, limits["hi"].low
-            return self.parameter(name, unit or "1", low, high, declared, default)
-        if value is None and usual is not None:
-            return usual
-        if value is None:
+        if value is not None:
+            found = self.amount(value, scope, unit, name)
+            bounds += [(side, number(end)) for side, end in ends.items()]
+        elif len(ends) == 2:
+            low, high = ends["lo"], ends["hi"]
+            found = self.parameter(name, unit or "1", low, high, declared, default)
+        elif usual is not None and not ends:
+            found = usual
+        else:
             refuse(f"'{name}' has no value, and no keep() limits it to a range", declared)
-        found = self.amount(value, scope, unit, name)
         parameter = self.sections["parameters"].get(found.text)
-        if limits and parameter is None:
+        if bounds and parameter is None:
             refuse(f"keep() limits '{name}', which has no range", declared)
         if parameter is not None and default is not None:
             parameter["default"] = default
-        for side, limit in limits.items():
-            said = {"why": "A keep() of the file.", "source": f"{declared.place}."}
+        for side, limit in bounds:
+            said = {"why": "A keep() of the file.", "source": declared.source}
             self.sections["bounds"].append({"target": found.text, side: limit.text, **said})
         return found
 

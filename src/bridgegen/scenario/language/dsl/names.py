@@ -325,7 +325,14 @@ class Names:
         """Return the unit that a unit is simulated in, and its factor; None if there is none."""
         of, factor, _ = self.units.get(name, ("", 1.0, None))
         if name in self.units and QUANTITIES.get(of) != "deg":  # files turn that factor round
-            return QUANTITIES.get(of, of), factor
+            unit = QUANTITIES.get(of, of)
+            exact = self._standard_unit(name)
+            near = exact is not None and exact[0] == unit and abs(factor / exact[1] - 1.0) < 1e-6
+            return exact if near else (unit, factor)
+        return self._standard_unit(name)
+
+    @staticmethod
+    def _standard_unit(name: str) -> tuple[str, float] | None:
         for unit in dict.fromkeys(QUANTITIES.values()):
             with suppress(ValueError):
                 return unit, in_unit(f"1 {UNITS.get(name, '?')}", unit)

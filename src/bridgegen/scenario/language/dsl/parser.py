@@ -7,6 +7,7 @@ grammar is refused at its line; size, tokens and depth are bounded.
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import Any, NamedTuple
 
 from bridgegen.base.errors import FileFormatError
@@ -66,6 +67,11 @@ class Node:
     def place(self) -> str:
         """File and line, for messages."""
         return f"{self.file}, line {self.line}"
+
+    @property
+    def source(self) -> str:
+        """The file's name and the line, for a scenario's sources."""
+        return f"{PurePath(self.file).name}, line {self.line}."
 
     def part(self, key: str) -> "tuple[Node, ...]":
         """Return the members under a key; none if it has none."""

@@ -18,6 +18,7 @@ FREE = (8.0, 14.0)
 """Speeds where a file leaves them open [m/s]: 29 to 50 km/h; ours."""
 
 MOST_LANES = 6
+_UNKNOWN = 0
 
 MODIFIERS: Mapping[str, tuple[str, ...]] = {
     "speed": ("speed",),
@@ -101,6 +102,7 @@ class Phase:
         node: the drive().
         asked: its modifiers and their arguments, by name and when they hold: ``lane end``.
         event: what becomes of it.
+        begins: the place at which it begins, where the file says it [m].
     """
 
     actor: Actor
@@ -111,6 +113,7 @@ class Phase:
     node: Node
     asked: dict[str, dict[str, Node]] = field(default_factory=dict)
     event: dict[str, Any] = field(default_factory=dict)
+    begins: Amount | None = None
 
     def ask(self, member: Node) -> None:
         """Take in a modifier, or a keep() of the speed."""
@@ -157,12 +160,15 @@ class Phases:
         self.lost = False
         """Whether places are unknown, since a condition of a row has decided when a phase began."""
 
-    def lane(self, actor: Actor) -> int:
+    def lane(self, actor: Actor, node: Node) -> int:
         """Return the lane that an actor is on; the right one where nothing has been said."""
         actor = self.actors[actor.name]
         if actor.lanes is None:
             self.actors[actor.name] = replace(actor, lanes=(self.lanes, self.lanes))
-        return (actor.lanes or (self.lanes, self.lanes))[1]
+        lane = (actor.lanes or (self.lanes, self.lanes))[1]
+        if lane == _UNKNOWN:
+            refuse(f"the lane of {actor.name} is another in each alternative of a one_of", node)
+        return lane
 
     def place(self, name: str, time: Amount) -> Amount:
         """Return where an actor is at a time [m]; one without a place is given one."""
@@ -184,9 +190,8 @@ class Phases:
             refuse(f"{name} would drive backwards at {speed.low:.3g} m/s", phase.node)
         self.highest = max(self.highest, speed.high, before.high)
         if first:
-            asked = phase.asked.get("position start") or phase.asked.get("position all")
-            if asked is not None:
-                at = self._target(phase, asked, phase.start) - before * phase.start
+            if (begins := self._begins(phase)) is not None:
+                at = begins - before * phase.start
                 at = self._amounts.short(at, f"{phase.name}_from", "m", phase.node)
                 self.actors[name] = replace(self.actors[name], at=at)
             at = self.place(name, _NOTHING)
@@ -227,6 +232,13 @@ class Phases:
         away = self._amounts.amount(given[""], phase.scope, "m", name)
         other = self.place(self.known(given[side]).name, time)
         return other + away if side == "ahead_of" else other - away
+
+    def _begins(self, phase: Phase) -> Amount | None:
+        """Return where an actor's first phase begins, if the file says it."""
+        asked = phase.asked.get("position start") or phase.asked.get("position all")
+        if asked is not None and phase.begins is None:
+            phase.begins = self._target(phase, asked, phase.start)
+        return phase.begins
 
     def known(self, node: Node) -> Actor:
         """Return the actor of a name."""
@@ -278,11 +290,9 @@ class Phases:
         if self.lost:
             refuse("after a condition nobody knows how far others are: no position at end", node)
         own = self.actors[phase.actor.name]
-        if own.at is None and not own.way and "position start" in phase.asked:
-            at = self._target(phase, phase.asked["position start"], phase.start)
-            self.actors[own.name] = replace(own, at=at)
+        begins = None if own.way else self._begins(phase)
         goal = self._target(phase, given, phase.start + phase.length)
-        mean = (goal - self.place(own.name, phase.start)) / phase.length
+        mean = (goal - (begins or self.place(own.name, phase.start))) / phase.length
         speed = mean if before is None else mean * 2.0 - before
         if speed.low < 0.0 < speed.high:
             what = "cannot be there in every row: it does not drive backwards"
@@ -305,7 +315,7 @@ class Phases:
             if actor.lanes is None and key in ("lane start", "lane all"):
                 self.actors[actor.name] = replace(actor, lanes=(target, target))
                 continue
-            lane = self.lane(actor)
+            lane = self.lane(actor, node)
             if key == "lane start" and target != lane:
                 refuse(f"a phase begins as the one before ends: {actor.name} is on {lane}", node)
             if target != lane:
@@ -321,7 +331,7 @@ class Phases:
         said, node, by = given.get(""), given["node"], 1
         if said is not None and said.kind == "range" and changes:
             low, high = (self._names_number(item) for item in said.items)
-            room = self.lane(phase.actor) - 1
+            room = self.lane(phase.actor, node) - 1
             if given["side"].name == "right":
                 room = self.lanes - room - 1
             if not low <= max(room, 1) < high and low != high:
@@ -339,7 +349,7 @@ class Phases:
             side = given.get("side", given.get("", node)).name
             if side not in ("left", "right"):
                 refuse("change_lane() needs a side, left or right", node)
-            return self.lane(phase.actor) + (-by if side == "left" else by)
+            return self.lane(phase.actor, node) + (-by if side == "left" else by)
         if not side and said is None:
             refuse("lane() is a number, or left_of, right_of or same_as another actor", node)
         if not side:
@@ -347,7 +357,7 @@ class Phases:
         if given[side].name == phase.actor.name:
             refuse(f"{phase.actor.name} cannot be {side.replace('_', ' ')} itself", node)
         shift = {"right_of": by, "left_of": -by, "same_as": 0}[side]
-        return self.lane(self.known(given[side])) + shift
+        return self.lane(self.known(given[side]), node) + shift
 
     @staticmethod
     def _names_number(node: Node) -> int:
@@ -386,9 +396,12 @@ class Phases:
         for name in dict.fromkeys(name for each in alternatives for name in each):
             able = [each[name] for each in alternatives if name in each]
             each = [actors.get(name, able[0]) for actors in alternatives]
-            lanes = {actor.lanes for actor in able if actor.lanes is not None}
-            if len(lanes) > 1:
-                refuse(f"{name} starts and ends on one lane in all of a one_of", node)
+            begun = [actor.lanes for actor in able if actor.lanes is not None]
+            if len({lanes[0] for lanes in begun}) > 1:
+                refuse(f"{name} starts on one lane in all alternatives of a one_of", node)
+            lanes = begun[0] if begun else None
+            if lanes is not None and len(set(begun)) > 1:
+                lanes = (lanes[0], _UNKNOWN)
             first = next((actor.speed for actor in able if actor.speed is not None), _NOTHING)
             speed = chosen([actor.speed or first for actor in each], f"{name}_first_speed", "m/s")
             now = chosen([actor.now for actor in each], f"{name}_speed", "m/s")
@@ -397,6 +410,6 @@ class Phases:
             there = chosen(places, f"{name}_at", "m")
             way = (Stretch(_NOTHING, at, speed, speed, None), Stretch(end, there, now, now, None))
             self.actors[name] = replace(
-                able[0], lanes=next(iter(lanes), None), at=at, speed=speed, way=way
+                able[0], lanes=lanes, at=at, speed=speed, way=way
             )
         return end

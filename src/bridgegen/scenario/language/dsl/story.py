@@ -375,10 +375,10 @@ class _Story:
         if self._since is not None and time.values[0] >= self._since[1].values[0]:
             conditions, base, marker = self._since
             later = time - base
-            if later.fixed and later.low == 0.0:
+            if later.fixed and later.low == 0.0 and not self._guards:
                 self._since = conditions, base, marker or name
                 return [dict(each) for each in conditions]
-            if not marker or not later.fixed:
+            if not marker or not later.fixed or self._guards:
                 refuse("after a condition, the next begins at once or a fixed time later", node)
             return [{"kind": "began", "event": marker, "value": round(later.low, 9)}]
         for guard in self._guards:
