@@ -340,18 +340,14 @@ class _Parser:
 
     def _method(self, line: int) -> Node:
         name, arguments = self._name(), self._declared()
-        of = self._type_name() if self._take("->") else ""
+        if self._take("->"):
+            self._type_name()
         self._need("is")
         self._take("only")
-        body = None
-        if self._take("expression"):
-            body = self._expression()
-        elif not self._take("undefined"):
-            self._need("external")
-            self._dotted()
-            self._arguments()
+        if self._need("expression", "undefined", "external").text != "undefined":
+            self._expression()  # or what is called, with its arguments
         self._end()
-        return self._node("def", line, name, arguments=arguments, of=of, body=body)
+        return self._node("def", line, name, arguments=arguments)
 
     def _declared(self) -> tuple[Node, ...]:
         found: list[Node] = []

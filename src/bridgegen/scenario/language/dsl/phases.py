@@ -332,7 +332,7 @@ class Phases:
         if said is not None and said.kind == "range" and changes:
             low, high = (self._names_number(item) for item in said.items)
             room = self.lane(phase.actor, node) - 1
-            if given["side"].name == "right":
+            if given.get("side", node).name == "right":
                 room = self.lanes - room - 1
             if not low <= max(room, 1) < high and low != high:
                 refuse("a change of lanes is by one number of them, not a range", said)
@@ -371,6 +371,8 @@ class Phases:
             if (aside := self._said(phase, key, "m")) is None:
                 continue
             side = phase.asked[key].get("side")
+            if side is not None and side.name not in ("left", "right"):
+                refuse("the side of lateral() is left or right", side)
             if side is not None and side.name == "right":
                 aside = number(0.0) - aside
             actor = self.actors[phase.actor.name]

@@ -258,7 +258,7 @@ class _Story:
                 if each.name != "duration":
                     refuse(f"{node.kind}() has a duration alone, got '{each.name}'", each)
                 name = f"{label or node.kind}_duration"
-                length = self._amounts.amount(each.items[0], scope, "s", name)
+                length = self._duration(each.items[0], scope, name)
             if node.part("given"):
                 refuse(f"'with' of a {node.kind} is not supported, of a drive() it is", node)
             end = self._composed(node, scope, start, length, label)
@@ -324,7 +324,7 @@ class _Story:
         name, until = f"{actor.name}_{label or 'drives'}", None
         for each in node.items[0].part("arguments"):
             if each.name == "duration":
-                length = self._amounts.amount(each.items[0], scope, "s", f"{name}_duration")
+                length = self._duration(each.items[0], scope, f"{name}_duration")
             elif each.name not in ("", "adjust"):
                 refuse(f"drive() has a duration alone, got '{each.name}'", each)
         phase = Phase(actor, scope, start, number(OPEN_PHASE), name, node)
@@ -386,16 +386,24 @@ class _Story:
         value = self._amounts.written(time, f"{name}_time", "s", node)
         return [{"kind": "time", "value": value}]
 
+    def _duration(self, node: Node, scope: Scope, name: str) -> Amount:
+        found = self._amounts.amount(node, scope, "s", name)
+        if not found.low > 0.0:
+            refuse(f"{name} must be greater than 0 s, got {found.low:g} s", node)
+        return found
+
     def _ended(
         self, happens: Node, scope: Scope, start: Amount, length: Amount | None, name: str,
         who: str = "",
     ) -> Amount:  # fmt: skip
         """Return when a wait or an until ends."""
         while happens.kind == "call" and happens.items[0].name in ("elapsed", "rise", "fall"):
-            given = happens.part("arguments")[0].items[0]
+            given = happens.part("arguments")
+            if len(given) != 1:
+                refuse(f"{happens.items[0].name}() has one value", happens)
             if happens.items[0].name == "elapsed":
-                return start + self._amounts.amount(given, scope, "s", name)
-            happens = given
+                return start + self._duration(given[0].items[0], scope, name)
+            happens = given[0].items[0]
         sign, items = happens.name, happens.items
         if happens.kind != "operation" or sign not in ("<", "<=", ">", ">="):
             refuse("wait and until end by elapsed(), or by a comparison", happens)
