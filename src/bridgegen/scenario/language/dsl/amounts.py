@@ -162,7 +162,7 @@ class Amounts:
         self._declare(
             "parameters", name, node, unit=unit, low=low, high=high, default=usual
         )  # fmt: skip
-        values = low + self._random.choice([0.0, 0.3, 0.6, 1.0], SAMPLE) * (high - low)
+        values = low + self._random.choice([0.0, 0.0, 0.5, 1.0, 1.0], SAMPLE) * (high - low)
         values[0] = usual
         return Amount(name, values)
 
