@@ -282,7 +282,14 @@ def validate(
 def _is_driver(text: str) -> bool:
     """Return whether a text names a driver, not a file to check."""
     path = Path(text)
-    if ":" not in text and path.suffix.lower() in (".owl", ".xodr", ".osc", ".xosc", ".yaml", ".yml"):
+    if ":" not in text and path.suffix.lower() in (
+        ".owl",
+        ".xodr",
+        ".osc",
+        ".xosc",
+        ".yaml",
+        ".yml",
+    ):
         return False  # without what drivers import
     from bridgegen.drivers import DRIVERS, is_remote
     from bridgegen.drivers.planners import planners

@@ -372,7 +372,9 @@ def simulate(
     stages = None if ideal is None else split(ideal)
     skipped: list[str] | None = [] if lenient else None
     file, runs = Path(scenario), common.read_simulator(simulator, simulator_set, connection)
-    is_logical = file.suffix.lower() in (".yaml", ".yml", ".osc") or not (file.suffix or file.exists())
+    is_logical = file.suffix.lower() in (".yaml", ".yml", ".osc") or not (
+        file.suffix or file.exists()
+    )
     if is_logical or fix or distribution or odd:
         from bridgegen.jobs.search.model import simulate_scenario  # takes longer than a file
 

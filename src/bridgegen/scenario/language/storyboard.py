@@ -130,7 +130,9 @@ class Storyboard:
         self._report, self._check = quantities.report, quantities.check
         document = quantities.document
         # Whether the scenario's own events move the ego, as it has no driver of its own.
-        self._by_file = isinstance(document.data, dict) and document.data.get("driver") == "storyboard"
+        self._by_file = (
+            isinstance(document.data, dict) and document.data.get("driver") == "storyboard"
+        )
         self.known = [str(name) for name, _ in entries(document, "participants")] + list(more)
         self._events_read = list(entries(document, "events"))
         self._event_names = [str(name) for name, _ in self._events_read]
@@ -636,7 +638,9 @@ class Storyboard:
             if given.participant is not None:
                 self._check_participant(given.participant, (*path, "participant"))
                 acting = self._acting.get(given.participant)
-                if (given.participant == EGO and not self._by_file) or (acting and acting.driver == EGO):
+                if (given.participant == EGO and not self._by_file) or (
+                    acting and acting.driver == EGO
+                ):
                     self._report("events move the others; the ego's driver is under test", path)
             when = tuple(
                 tuple(self._conditions(given, condition_section, (*path, "when", number)))

@@ -5,6 +5,7 @@ known without a file; of types that a file declares, fields are known as well.
 """
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -13,7 +14,7 @@ from types import MappingProxyType
 
 from bridgegen.base.errors import FileFormatError, ScenarioError
 from bridgegen.base.units import in_unit
-from bridgegen.scenario.language.dsl.parser import COMPOSITIONS, MAX_BYTES, TYPES, Node, parse
+from bridgegen.scenario.language.dsl.parser import COMPOSITIONS, MAX_BYTES, Node, parse
 
 MOST_FILES = 32
 
@@ -50,15 +51,33 @@ ACTORS: Mapping[str, str] = MappingProxyType(
 """The type of participant that an actor of the domain model is, by its type's name."""
 
 _DOMAIN = frozenset(
-    """int uint float bool string mass temperature pressure jerk angular_rate angular_acceleration
-    luminous_intensity illuminance position_3d pose_3d orientation_3d route_point odr_point
-    xyz_point path_point path route trajectory map environment env weather color directionality
-    vehicle_category bounding_box axle osc_actor physical_object stationary_object movable_object
-    traffic_participant person animal pedestrian lane junction crossing road
-    """.split()
+    re.findall(
+        r"\w+",
+        """int uint float bool string mass temperature pressure jerk angular_rate illuminance
+        angular_acceleration luminous_intensity position_3d pose_3d orientation_3d route_point
+        odr_point xyz_point path_point path route trajectory map environment env weather color
+        directionality vehicle_category bounding_box axle osc_actor physical_object
+        stationary_object movable_object traffic_participant person animal pedestrian lane
+        junction crossing road""",
+    )
 ) | {*QUANTITIES, *ACTORS}
 _COLOURS = {"white", "silver", "gray", "black", "red", "yellow", "green", "blue", "brown"}
 _SI = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
+
+
+_ORDER = (
+    "type",
+    "unit",
+    "enum",
+    "struct",
+    "actor",
+    "action",
+    "scenario",
+    "modifier",
+    "extend",
+    "global",
+)
+"""The order in which kinds of declarations are taken in, wherever they stand."""
 
 
 @dataclass
@@ -104,6 +123,8 @@ class Names:
         self._standard = False
         self._nodes: list[Node] = []
         self._read(path, path.parent)
+        self._nodes.sort(key=lambda node: _ORDER.index(node.kind))
+        self._bases = {node.name: node for node in reversed(self._nodes) if node.more.get("base")}
         for node in self._nodes:
             self._declare(node)
         for found in self.types.values():
@@ -171,6 +192,8 @@ class Names:
                 self._take(known, node.part("members"))
         elif not self._again(name, node, known.node if known else None):
             base, found = str(node.more["base"]), Type(node)
+            if base in self._bases and base not in self.types:
+                self._declare(self._bases.pop(base))
             actor, dot, short = node.name.rpartition(".")
             of = self.types.get(actor)
             if dot and (of.node.kind != "actor" if of else actor not in _DOMAIN):
@@ -200,9 +223,10 @@ class Names:
             found.members.append(member)
             if member.kind in ("field", "var"):
                 self._add(found.fields, member)
-            elif member.kind == "event":
-                if not self._again(member.name, member, found.events.get(member.name)):
-                    found.events[member.name] = member
+            elif member.kind == "event" and not self._again(
+                member.name, member, found.events.get(member.name)
+            ):
+                found.events[member.name] = member
 
     def _add(self, fields: dict[str, Node], node: Node) -> None:
         for name in node.more["names"]:
@@ -244,20 +268,16 @@ class Names:
         elif node.kind == "enum" and (known is not None or name in self.types):
             self._refuse(f"'{name}' is declared already", node)
             return
-        values, last = self.enums.setdefault(name, []), None
-        for member in members:
+        values = self.enums.setdefault(name, [])
+        last = len(values) - 1
+        for number, member in enumerate(members):
             value = member.more["value"]
             if member.name in values:
                 self._refuse(f"'{member.name}' is a value of {name} already", member)
-            elif value is not None and last is not None and value != last + 1:
-                self._refuse(
-                    f"values of an enum succeed each other: '{member.name}' must be {last + 1}, "
-                    f"got {value}",
-                    member,
-                )
-            last = (
-                value if value is not None else -1 + len(values) + 1 if last is None else last + 1
-            )
+            elif number and value not in (None, last + 1):
+                what = f"'{member.name}' must be {last + 1}, got {value}"
+                self._refuse(f"values of an enum succeed each other: {what}", member)
+            last = last + 1 if value is None else value
             values.append(member.name)
 
     # -- what refers to names ----------------------------------------------------------------------
@@ -279,8 +299,8 @@ class Names:
                 elif node.kind == "number" and node.name and self.unit(node.name) is None:
                     self._refuse(f"no unit '{node.name}' is declared", node)
                 elif node.kind in (*COMPOSITIONS, "drive", "wait") and node.name:
-                    if not self._again(node.name, node, labels.get(node.name)):
-                        labels[node.name] = node
+                    self._again(node.name, node, labels.get(node.name))
+                    labels.setdefault(node.name, node)
             if member.kind == "keep" and own == member.file:
                 self._check_keep(member, found, None)
             of = self.types.get(str(member.more.get("of")))
@@ -297,27 +317,23 @@ class Names:
 
     def _check_keep(self, keep: Node, found: Type, it: Type | None) -> None:
         """Check the names that a constraint reads: its fields, and those of their types."""
-        values = {value for each in self.enums.values() for value in each} | _COLOURS
+        known = {value for each in self.enums.values() for value in each} | _COLOURS
+        known |= {"it", *self.types, *_DOMAIN, *(it.fields if it else ())}
         inner = {id(node.items[0]) for node in keep.every() if node.kind == "member_of"}
         for node in keep.every():
             root = node.items[0] if node.kind == "member_of" else node
-            if root.kind != "name" or (node.kind == "name" and id(node) in inner):
+            if root.kind != "name" or id(node) in inner:
                 continue
             declared = found.fields.get(root.name) or self.fields.get(root.name)
             of = self.types.get(str(declared.more["of"])) if declared else None
             of = it if root.name == "it" else of
-            is_known = root.name in (*values, *self.types, "it", "speed", "actor")
-            if declared is None and not is_known:
-                has = it is not None and root.name in it.fields
-                if not has and not (keep is not None and root.name in _DOMAIN):
-                    self._refuse(f"no field '{root.name}' is declared", node)
-            elif node.kind == "member_of" and of is not None and node.name not in of.fields:
-                if of.node.kind in TYPES and node.name not in ("as", "is"):
-                    self._refuse(f"'{node.name}' is no field of {of.node.name}", node)
-            elif declared is not None and declared.kind == "var" and declared.more["value"] is None:
-                self._refuse(
-                    f"the variable '{root.name}' has no value that a keep() could limit", node
-                )
+            if declared is None and root.name not in known:
+                self._refuse(f"no field '{root.name}' is declared", node)
+            elif root is not node and of and node.name not in (*of.fields, "as", "is"):
+                self._refuse(f"'{node.name}' is no field of {of.node.name}", node)
+            elif declared and declared.kind == "var" and declared.more["value"] is None:
+                what = "has no value that a keep() could limit"
+                self._refuse(f"the variable '{root.name}' {what}", node)
 
     # -- values ------------------------------------------------------------------------------------
 

@@ -411,7 +411,5 @@ class Phases:
             at = next((actor.at for actor in able if actor.at is not None), _NOTHING)
             there = chosen(places, f"{name}_at", "m")
             way = (Stretch(_NOTHING, at, speed, speed, None), Stretch(end, there, now, now, None))
-            self.actors[name] = replace(
-                able[0], lanes=lanes, at=at, speed=speed, way=way
-            )
+            self.actors[name] = replace(able[0], lanes=lanes, at=at, speed=speed, way=way)
         return end

@@ -7,8 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from bridgegen.base.errors import ScenarioError, UnsupportedError
-from bridgegen.scenario.language.dsl.amounts import Amount, Amounts, Guard, Scope
-from bridgegen.scenario.language.dsl.amounts import number, refuse, unit_of
+from bridgegen.scenario.language.dsl.amounts import (
+    Amount,
+    Amounts,
+    Guard,
+    Scope,
+    number,
+    refuse,
+    unit_of,
+)
 from bridgegen.scenario.language.dsl.names import ACTORS, Names, Type
 from bridgegen.scenario.language.dsl.parser import COMPOSITIONS, Node
 from bridgegen.scenario.language.dsl.phases import Actor, Phase, Phases
