@@ -81,12 +81,16 @@ class Actor:
             return self.at or _NOTHING
         begun = [each for each in self.way if each.start.values[0] <= time.values[0] + 1e-9]
         start, at, before, speed, within = begun[-1] if begun else self.way[0]
-        since = time - start
-        if within is not None and since.text == within.text:
+        since, gain = time - start, speed - before
+        if since.fixed and since.low == 0.0:
+            return at
+        if within is None:
+            return at + speed * since - gain * abs(gain) / (2.0 * RATE)
+        if since.text == within.text:
             return at + (before + speed) * within / 2.0
-        gain = speed - before
-        lost = gain * abs(gain) / (2.0 * RATE) if within is None else gain * within / 2.0
-        return at + speed * since - lost
+        if since.values[0] < within.values[0]:
+            return at + before * since + gain * since * since / within / 2.0
+        return at + speed * since - gain * within / 2.0
 
 
 @dataclass
@@ -157,6 +161,8 @@ class Phases:
         self.actors: dict[str, Actor] = {}
         self.lanes, self.highest = 1, 0.0
         self.notes: list[str] = []
+        self.from_zero = False
+        """Whether the file counts lanes from 0 on."""
         self.lost = False
         """Whether places are unknown, since a condition of a row has decided when a phase began."""
 
@@ -183,6 +189,8 @@ class Phases:
     def drive(self, phase: Phase) -> dict[str, Any]:
         """Take in a phase; return its event, empty where nothing changes."""
         name, first = phase.actor.name, not phase.actor.way
+        if not first and phase.start.values[0] < phase.actor.way[-1].start.values[0] - 1e-9:
+            refuse(f"{name} drives in two phases at once", phase.node)
         self._change_lanes(phase, first)
         self._aside(phase, first)
         before, speed, within = self._speeds(phase, first)
@@ -302,12 +310,12 @@ class Phases:
         return (speed, speed, None) if before is None else (before, speed, phase.length)
 
     def _change_lanes(self, phase: Phase, first: bool) -> None:
-        for key in ("lane start", "lane all", "lane end", *phase.asked):
-            given = phase.asked.get(key)
-            if given is None or not key.startswith(("lane ", "change_lane")):
+        changes = [key for key in phase.asked if key.startswith("change_lane")]
+        for key in ("lane start", "lane all", "lane end", *changes):
+            if (given := phase.asked.get(key)) is None:
                 continue
             actor, node = self.actors[phase.actor.name], given["node"]
-            target = self._lane_of(phase, given, key.startswith("change_lane"))
+            target = self._lane_of(phase, given, key in changes)
             if not 1 <= target <= MOST_LANES:
                 what = f"lanes are 1, the leftmost, to {MOST_LANES}"
                 refuse(f"{what}; {actor.name} would be on lane {target}", node)
@@ -353,7 +361,7 @@ class Phases:
         if not side and said is None:
             refuse("lane() is a number, or left_of, right_of or same_as another actor", node)
         if not side:
-            return by
+            return by + self.from_zero
         if given[side].name == phase.actor.name:
             refuse(f"{phase.actor.name} cannot be {side.replace('_', ' ')} itself", node)
         shift = {"right_of": by, "left_of": -by, "same_as": 0}[side]

@@ -76,6 +76,11 @@ class _Story:
         self._since: tuple[list[dict[str, Any]], Amount, str] | None = None
         self._junction: float | None = None
         self._depth = 0
+        for found in names.types.values():
+            for node in (node for member in found.members for node in member.every()):
+                if node.kind == "call" and node.items[0].name == "lane" and node.part("arguments"):
+                    zero = node.part("arguments")[0].items[0].more.get("value") == 0.0
+                    self._phases.from_zero |= zero
 
     # -- the document ------------------------------------------------------------------------------
 
