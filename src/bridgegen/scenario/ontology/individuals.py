@@ -174,9 +174,16 @@ def build(
     add_perception(builder, story)
     if odd:
         put(builder.iri(EGO), "has_odd", odd)
+    own = {event.name for event in story.events if event.participant == EGO}
     for event in story.events:
         if driver and event.participant == EGO:
             continue  # the driver decides
+        awaited = {each.event for conditions in event.when for each in conditions}
+        if driver and (gone := sorted(awaited & own)):
+            raise InputError(
+                f"event '{event.name}' waits for '{gone[0]}' of the ego, which {driver} drives "
+                f"({scenario.place})"
+            )
         put(top, "has_event", add_event(builder, event, declared, place))
     for name, course in (courses or {}).items():
         put(top, "has_event", add_course(builder, name, course))

@@ -182,7 +182,7 @@ class Phases:
         if actor.at is None and not actor.way:
             at = 30.0 * sum(other.at is not None for other in self.actors.values())
             if at:
-                self.notes.append(f"{name} has no position: it starts at {at:g} m")
+                self.notes.append(f"{name} has no position: it starts {at:g} m ahead")
             self.actors[name] = actor = replace(actor, at=number(at))
         return actor.at_time(time)
 

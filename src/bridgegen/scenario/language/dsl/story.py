@@ -134,7 +134,7 @@ class _Story:
             self._notes.append("the file has no ranges: a search varies the weather")
         if any(event["participant"] == "ego" for event in self._events.values()):
             what = "it moves as the file says, unless --ego names a driver, which decides itself"
-            self._notes.append(f"{ego.name} is the ego: {what}")
+            self._notes.append(f"the ego, {ego.name}: {what}")
         lines = {("participants",): line, ("events",): line, **self._amounts.lines}
         return Document(data, lines, str(self._path), notes=tuple(dict.fromkeys(self._notes)))
 
