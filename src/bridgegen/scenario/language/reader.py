@@ -16,7 +16,6 @@ from bridgegen.scenario.language.adversary import DRIVERS, SCRIPTED, driven
 from bridgegen.scenario.language.checks import NEEDED, time_problems, try_out, use_problems
 from bridgegen.scenario.language.constraints import problems_of
 from bridgegen.scenario.language.criteria import read_criteria_in, unknown_entities
-from bridgegen.scenario.language.dsl.story import read_dsl
 from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.kinds import FLOAT, KEYS, KINDS, Kind
 from bridgegen.scenario.language.objectives import HARM, PAPERS, read_objective
@@ -123,7 +122,7 @@ def load(name_or_path: str | Path) -> LogicalScenario:
 
     Args:
         name_or_path: a name of the catalogue or of a pack ("r157/cut-in"), or the path of a file
-            (ends in .yaml or .yml).
+            (ends in .yaml, .yml or, OpenSCENARIO DSL, .osc).
 
     Raises:
         UnknownNameError: no such name in the catalogue or the packs.
@@ -159,6 +158,8 @@ def document_of(name_or_path: str | Path) -> tuple[Document, Path | None]:
     text = str(name_or_path)
     path = Path(text)
     if path.suffix.lower() == DSL:
+        from bridgegen.scenario.language.dsl.story import read_dsl
+
         return read_dsl(path), path.parent
     is_path = isinstance(name_or_path, Path) or path.suffix in (".yaml", ".yml")
     # A name with a slash is a pack's only where there is such a pack; any other one is a path, and
