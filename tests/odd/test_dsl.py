@@ -189,6 +189,16 @@ def test_what_else_is_outside(file):
         parse(b" " * (2**20 + 1), "x.osc")
     with refuses(FileFormatError, "deep"):
         parse(b"scenario a:\n    keep(" + b"(" * 5000 + b")" * 5000 + b")\n", "x.osc")
+    with refuses(FileFormatError, "chain"):
+        parse(b"scenario a:\n    keep(1" + b"+1" * 5000 + b")\n", "x.osc")
+    with refuses(FileFormatError, "digits"):
+        parse(b"scenario a:\n    keep(0x" + b"f" * 5000 + b")\n", "x.osc")
+    with refuses(FileFormatError, "comment"):
+        parse(b"/* " * 100_000, "x.osc")
+    calls = (f"scenario s{k}:\n    do serial:\n" + f"        s{k + 1}()\n" * 10 for k in range(9))
+    file.write_text("".join(calls) + "scenario s9:\n    do ego.drive(duration: 1s)\n", "utf-8")
+    with refuses(UnsupportedError, "phases"):
+        load(file)
     with refuses(FileFormatError, "indentation"):
         parse(b"scenario a:\n        event b\n    event c\n", "x.osc")
 

@@ -178,12 +178,12 @@ def build(
     for event in story.events:
         if driver and event.participant == EGO:
             continue  # the driver decides
-        awaited = {each.event for conditions in event.when for each in conditions}
-        if driver and (gone := sorted(awaited & own)):
-            raise InputError(
-                f"event '{event.name}' waits for '{gone[0]}' of the ego, which {driver} drives "
-                f"({scenario.place})"
-            )
+        for condition in (each for conditions in event.when for each in conditions):
+            if driver and condition.event in own:
+                raise InputError(
+                    f"event '{event.name}' waits for '{condition.event}' of the ego, which "
+                    f"{driver} drives ({scenario.place})"
+                )
         put(top, "has_event", add_event(builder, event, declared, place))
     for name, course in (courses or {}).items():
         put(top, "has_event", add_course(builder, name, course))

@@ -114,7 +114,7 @@ class Names:
 
     def __init__(self, path: Path) -> None:
         self.types: dict[str, Type] = {}
-        self.enums: dict[str, list[str]] = {}
+        self.enums: dict[str, dict[str, int]] = {}
         self.quantities: dict[str, Node] = {}
         self.units: dict[str, tuple[str, float, Node]] = {}
         self.fields: dict[str, Node] = {}
@@ -268,8 +268,8 @@ class Names:
         elif node.kind == "enum" and (known is not None or name in self.types):
             self._refuse(f"'{name}' is declared already", node)
             return
-        values = self.enums.setdefault(name, [])
-        last = len(values) - 1
+        values = self.enums.setdefault(name, {})
+        last = next(reversed(values.values()), -1)
         for number, member in enumerate(members):
             value = member.more["value"]
             if member.name in values:
@@ -278,7 +278,7 @@ class Names:
                 what = f"'{member.name}' must be {last + 1}, got {value}"
                 self._refuse(f"values of an enum succeed each other: {what}", member)
             last = last + 1 if value is None else value
-            values.append(member.name)
+            values[member.name] = last
 
     # -- what refers to names ----------------------------------------------------------------------
 

@@ -19,6 +19,7 @@ COMPOSITIONS = ("serial", "parallel", "one_of")
 
 _TOKEN = re.compile(
     r"""(?P<space>[ \t\r\f]+|\\[ \t]*\r?\n|\#[^\n]*|/\*(?s:.*?)\*/)
+    |(?P<open>/\*)
     |(?P<newline>\n)
     |(?P<text>\"{3}(?s:.*?)\"{3}|'{3}(?s:.*?)'{3}|"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*')
     |(?P<number>0x[0-9A-Fa-f]+|[0-9]*\.[0-9]+(?:[eE][-+]?[0-9]+)?|[0-9]+(?:[eE][-+]?[0-9]+)?)
@@ -97,8 +98,9 @@ def tokens_of(text: str, place: str) -> list[Token]:
     text += "\n"
     while at < len(text):
         match = _TOKEN.match(text, at)
-        if match is None:
-            what = "a text does not end" if text[at] in "\"'" else f"unexpected {text[at]!r}"
+        if match is None or match.lastgroup == "open":
+            is_open = match is not None or text[at] in "\"'"
+            what = "a text or comment does not end" if is_open else f"unexpected {text[at]!r}"
             raise FileFormatError(f"not OpenSCENARIO DSL: {what} ({place}, line {line})")
         kind, word, start = str(match.lastgroup), match[0], at
         at = match.end()
@@ -186,7 +188,7 @@ class _Parser:
     def _refuse(self, wanted: str) -> None:
         kind, text, line = self._next
         names = {"line": "the end of the line", "in": "an indentation", "out": "the block's end"}
-        got = f"'{text}'" if text else names.get(kind, "the file's end")
+        got = f"'{text[:40]}'" if text else names.get(kind, "the file's end")
         what = f"{wanted} is needed, got {got}"
         raise FileFormatError(f"not OpenSCENARIO DSL: {what} ({self._place}, line {line})")
 
@@ -254,7 +256,13 @@ class _Parser:
         while not members or self._take(","):
             at = self._next.line
             member = self._name()
-            value = int(self._kind("number", "a number").text, 0) if self._take("=") else None
+            value = None
+            if self._take("="):
+                text = self._kind("number", "a whole number").text
+                if not re.fullmatch(r"[0-9]{1,9}|0x[0-9A-Fa-f]{1,8}", text):
+                    self._at -= 1
+                    self._refuse("a whole number below 1e9")
+                value = int(text, 16 if "x" in text else 10)
             members.append(self._node("member", at, member, value=value))
         self._need("]")
         self._kind("line", "a new line")
@@ -412,7 +420,9 @@ class _Parser:
             found = self._factor()
         else:
             found = self._expression(level + 1)
+            chain = 0
             while self._sees(*_LEVELS[level]):
+                chain = self._longer(chain)
                 sign = self._name_or_sign()
                 right = self._expression(level + 1)
                 found = self._node("operation", line, sign, found, right)
@@ -422,6 +432,11 @@ class _Parser:
                 found = self._node("choice", line, "", found, yes, self._expression())
         self._depth -= 1
         return found
+
+    def _longer(self, chain: int) -> int:
+        if chain >= 8 * MAX_DEPTH:  # what reads it goes as deep as it is long
+            self._refuse(f"a chain of {8 * MAX_DEPTH} values at most")
+        return chain + 1
 
     def _name_or_sign(self) -> str:
         self._at += 1
@@ -435,8 +450,9 @@ class _Parser:
         return self._node("operation", line, "minus", found) if signs % 2 else found
 
     def _postfix(self) -> Node:
-        found = self._primary()
+        found, chain = self._primary(), 0
         while True:
+            chain = self._longer(chain)
             line = self._next.line
             if self._take("."):
                 found = self._node("member_of", line, self._name(), found)
@@ -470,6 +486,8 @@ class _Parser:
     def _primary(self) -> Node:
         kind, text, line = self._next
         if kind == "number":
+            if len(text) > 40:
+                self._refuse("a number of 40 digits at most")
             self._at += 1
             value = float(int(text, 16)) if text.startswith("0x") else float(text)
             unit = ""

@@ -28,6 +28,8 @@ NEVER = 1e5
 OPEN_PHASE = 10.0
 """Duration of a phase that states none [s]; ours."""
 
+MOST_STEPS = 300
+
 STEP = 0.05
 """Time step [s]."""
 
@@ -75,7 +77,7 @@ class _Story:
         self._guards: list[Guard] = []
         self._since: tuple[list[dict[str, Any]], Amount, str] | None = None
         self._junction: float | None = None
-        self._depth = 0
+        self._depth = self._steps = 0
         for found in names.types.values():
             for node in (node for member in found.members for node in member.every()):
                 if node.kind == "call" and node.items[0].name == "lane" and node.part("arguments"):
@@ -267,7 +269,9 @@ class _Story:
         self, node: Node, scope: Scope, start: Amount, length: Amount | None, label: str
     ) -> Amount:
         """Go through a member of a do; return when it ends."""
-        label = node.name or label
+        label, self._steps = node.name or label, self._steps + 1
+        if self._steps > MOST_STEPS:
+            refuse(f"a scenario has {MOST_STEPS} phases at most, also by calls of others", node)
         if node.kind in COMPOSITIONS:
             for each in node.part("arguments"):
                 if each.name != "duration":
@@ -364,15 +368,15 @@ class _Story:
             return start + phase.length
         return self._ended(until, scope, start, phase.length, name, actor.name)
 
-    def _actor(self, name: str, scope: Scope, node: Node) -> Actor:
+    def _actor(self, name: str, scope: Scope, node: Node, depth: int = 0) -> Actor:
         scopes = [scope.of, *self._names.types.values()]
         fields = [each.fields for each in scopes if each.node.kind in ("scenario", "action")]
         declared = next((each[name] for each in fields if name in each), None)
         if declared is None and name not in _EGOS:
             raise ScenarioError(f"no actor '{name}' is declared ({node.place})")
         other = declared.more["value"] if declared is not None else None
-        if other is not None and other.kind == "name" and other.name != name:
-            return self._actor(other.name, scope, node)
+        if other is not None and depth < 8:
+            return self._actor(dotted(other), scope, node, depth + 1)
         kind = str(declared.more["of"]) if declared is not None else "vehicle"
         known = self._names.types.get(kind)
         while kind not in ACTORS and known is not None and known.node.more["base"]:
