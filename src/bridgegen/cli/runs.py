@@ -255,12 +255,25 @@ def new(
             autocompletion=completing("scenario"),
         ),
     ] = None,
+    says: Annotated[
+        str | None,
+        typer.Option(
+            help="Start from the catalogue scenario that this sentence says, in controlled "
+            "English; prints each phrase beside its key, refuses what is not understood."
+        ),
+    ] = None,
 ) -> None:
     """Write a commented scenario file to start from."""
-    from bridgegen.scenario.language.starter import start_scenario
+    from bridgegen.scenario.language.starter import start_from_sentence, start_scenario
 
-    path = start_scenario(name, like=like)
-    print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
+    mark = ""
+    if says is None:
+        path = start_scenario(name, like=like)
+    else:
+        path, lines = start_from_sentence(name, says, like=like)
+        print(*lines, sep="\n")
+        mark = "# "  # all that is printed is YAML
+    print(f"{mark}{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
 
 
 @app.command()

@@ -339,6 +339,14 @@ class _Declarations:
                 f"parameters.{name}.default must be {kind.expected()}, got {given.default!r}"
                 f"{at(place)}"
             )
+        if given.only is not None:
+            low = high = kind.read(given.only, low, high) if kind.names else None
+            if low is None or default != low:
+                choice = f"one of {', '.join(kind.names)}" if kind.names else "none without values"
+                raise ScenarioError(
+                    f"parameters.{name}.only must be {choice}, and its default, "
+                    f"got {given.only!r}, default {given.default!r}{at(place)}"
+                )
         self.parameters.append(
             Parameter(
                 self._prefix + name,

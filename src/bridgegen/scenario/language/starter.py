@@ -10,7 +10,9 @@ from pathlib import Path
 
 from bridgegen.base.errors import InputError, StorageError, UnknownNameError
 from bridgegen.scenario.language.json_schema import FILE, refuse_other_schema, write_schema
+from bridgegen.scenario.language.narrowed import narrow
 from bridgegen.scenario.language.reader import names, pack_names, shipped_text
+from bridgegen.scenario.language.sentence import read_sentence
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
@@ -33,12 +35,7 @@ def start_scenario(name: str, *, like: str | None = None, folder: Path | None = 
         StorageError: there is such a file already, or what is called like the schema and is none,
             or it cannot be written.
     """
-    if not _WORD.fullmatch(name):
-        raise InputError(
-            f"a scenario's name is a word of letters, digits, '_' and '-', 64 at most, got '{name}'"
-        )
-    if name in names():
-        raise InputError(f"'{name}' ships with BridgeGen; choose another name")
+    _refuse_name(name)
     if like is None:
         text = (
             resources.files("bridgegen.scenario.language")
@@ -51,6 +48,45 @@ def start_scenario(name: str, *, like: str | None = None, folder: Path | None = 
         text = re.sub(r"^scenario: .*$", f"scenario: {name}", text, count=1, flags=re.M)
     else:
         raise UnknownNameError("scenario", like, known)
+    return _write(name, text, folder)
+
+
+def start_from_sentence(
+    name: str, sentence: str, *, like: str | None = None, folder: Path | None = None
+) -> tuple[Path, tuple[str, ...]]:
+    """Write ``NAME.yaml``, the scenario of the catalogue that a sentence says, and its schema.
+
+    Args:
+        name: as for `start_scenario`.
+        sentence: what happens; see ``scenario/phrases.yaml``.
+        like: the scenario of the catalogue that it is about; by default it says so itself.
+        folder: as for `start_scenario`.
+
+    Returns:
+        The file, and what was understood, as lines of YAML: a key and its value, and the words of
+        the sentence in a comment.
+
+    Raises:
+        InputError: the name is no word; a part of the sentence is not understood, has two
+            meanings, or is not possible in the scenario.
+        UnknownNameError: no such scenario.
+        StorageError: as for `start_scenario`.
+    """
+    _refuse_name(name)
+    made = narrow(read_sentence(sentence, like), name)
+    return _write(name, made.text, folder), made.lines
+
+
+def _refuse_name(name: str) -> None:
+    if not _WORD.fullmatch(name):
+        raise InputError(
+            f"a scenario's name is a word of letters, digits, '_' and '-', 64 at most, got '{name}'"
+        )
+    if name in names():
+        raise InputError(f"'{name}' ships with BridgeGen; choose another name")
+
+
+def _write(name: str, text: str, folder: Path | None) -> Path:
     path = (folder or Path()) / f"{name}.yaml"
     refuse_other_schema(path.with_name(FILE))
     text = f"# yaml-language-server: $schema={FILE}\n{text}"
