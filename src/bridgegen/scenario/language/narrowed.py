@@ -23,7 +23,7 @@ from bridgegen.scenario.named_models import MODELS
 from bridgegen.scenario.participants import PARTICIPANTS, Body
 
 _STARTS = 400
-_HALVINGS = 6
+_SHARES = (0.75, 0.5, 0.25, 0.1, 0.0)
 
 Ranges = dict[str, tuple[float, float]]
 
@@ -88,63 +88,53 @@ class _Work:
         Raises:
             InputError: there are none.
         """
-        defaults = next((row for row in self._rows() if self._fits(self._at(row), row)), None)
-        if defaults is None:
-            raise InputError(
-                f"{self.sentence.scenario.name} cannot be as '{self.sentence.text}' says: "
-                f"{self.problem or 'its constraints leave no value'}"
-            )
-        if self._fits(self.wanted, defaults):
-            return self.wanted, defaults
-        # One other parameter may be all that is in the way; the one that keeps most of its range.
-        free = tuple(self._free())
-        shares = {(name,): self._share((name,), defaults) for name in free}
-        names = max(shares, key=lambda names: shares[names], default=free)
-        if shares.get(names, -1.0) <= 0.0:
-            names = free
-        ranges = self._around(names, max(self._share(names, defaults), 0.0), defaults)
-        # Not each end of what was narrowed need be.
+        for defaults in self._rows():
+            if self._fits(self.wanted, defaults):
+                return self.wanted, defaults
+            if (ranges := self._less(defaults)) is not None:
+                return ranges, defaults
+        raise InputError(
+            f"{self.sentence.scenario.name} cannot be as '{self.sentence.text}' says: "
+            f"{self.problem or 'its constraints leave no value'}"
+        )
+
+    def _less(self, at: Mapping[str, float]) -> Ranges | None:
+        """Return ranges of which others than those that are said are narrowed; None if none do."""
         parameters = self.sentence.scenario.parameters
-        for name in names:
-            for wider in (
-                (parameters[name].low, ranges[name][1]),
-                (ranges[name][0], parameters[name].high),
-            ):
-                if self._fits({**ranges, name: wider}, defaults):
-                    ranges[name] = wider
-        return ranges, defaults
+        free = [
+            (name, item.low, item.high)
+            for name, item in parameters.items()
+            if name not in self.wanted and item.kind.name == "float" and item.low < item.high
+        ]
+        # One end may be all that is in the way; if not, ends of all, of which most may stay.
+        ends = [((name, side),) for name, *_ in free for side in (0, 1)]
+        every = tuple((name, side) for name, *_ in free for side in (0, 1))
+        for names in (ends, [every]):
+            for share in _SHARES:
+                for some in names:
+                    ranges = dict(self.wanted)
+                    for name, side in some:
+                        item = parameters[name]
+                        pair = list(ranges.get(name, (item.low, item.high)))
+                        pair[side] = _nearer(pair[side], at[name], share)
+                        ranges[name] = (pair[0], pair[1])
+                    if self._fits(ranges, at):
+                        return self._widened(ranges, at)
+        return None
 
-    def _free(self) -> Iterator[str]:
-        """Yield the scenario's own parameters of which nothing is said."""
-        for name, parameter in self.sentence.scenario.parameters.items():
-            own = parameter.axis is not Axis.WEATHER and not parameter.kind.names
-            if own and name not in self.wanted and parameter.low < parameter.high:
-                if parameter.kind.name == "float":
-                    yield name
-
-    def _at(self, defaults: Mapping[str, float]) -> Ranges:
-        return self._around(tuple(self._free()), 0.0, defaults)
-
-    def _around(self, names: tuple[str, ...], share: float, at: Mapping[str, float]) -> Ranges:
-        """Return ranges of which some reach only by a share of the way from their defaults."""
-        parameters, found = self.sentence.scenario.parameters, dict(self.wanted)
-        for name in names:
-            low, high, middle = parameters[name].low, parameters[name].high, at[name]
-            ends = (middle - share * (middle - low), middle + share * (high - middle))
-            rounded = (np.ceil(ends[0] * 100) / 100, np.floor(ends[1] * 100) / 100)
-            found[name] = (min(float(rounded[0]), middle), max(float(rounded[1]), middle))
-        return found
-
-    def _share(self, names: tuple[str, ...], defaults: Mapping[str, float]) -> float:
-        """Return the largest share by which the file is valid; -1: not even with none."""
-        if not self._fits(self._around(names, 0.0, defaults), defaults):
-            return -1.0
-        low, high = 0.0, 1.0
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            fits = self._fits(self._around(names, middle, defaults), defaults)
-            low, high = (middle, high) if fits else (low, middle)
-        return low
+    def _widened(self, ranges: Ranges, at: Mapping[str, float]) -> Ranges:
+        """Return ranges of which each end is the catalogue's again, where that is possible."""
+        # Twice: another that is wider may make room for it.
+        for name in [name for name in ranges if name not in self.wanted] * 2:
+            full = self.sentence.scenario.parameters[name]
+            for side, end in enumerate((full.low, full.high)):
+                pair = (end, ranges[name][1]) if side == 0 else (ranges[name][0], end)
+                if pair != ranges[name] and self._fits({**ranges, name: pair}, at):
+                    ranges[name] = pair
+            if ranges[name] == (full.low, full.high):
+                ranges = {key: ends for key, ends in ranges.items() if key != name}
+                return self._widened(ranges, at)
+        return ranges
 
     def _fits(self, ranges: Ranges, defaults: Mapping[str, float]) -> bool:
         place = f"{self.name}.yaml"
@@ -304,7 +294,6 @@ class _Work:
             (f"parameters.{name}", _interval(scenario.parameters[name], *ends), self._words(name))
             for name, ends in ranges.items()
             if name not in self.wanted
-            and ends != (scenario.parameters[name].low, scenario.parameters[name].high)
         ]
         wide = max(len(f"{key}: {value}") for key, value, _ in rows)
         for key, value, words in rows:
@@ -319,6 +308,13 @@ class _Work:
                     f"rear of its reference point, in {scenario.name} {old.front:g} m and "
                     f"{old.rear:g} m: formulas there that hold a length are not changed"
                 )
+
+
+def _nearer(end: float, middle: float, share: float) -> float:
+    """Return an end of a range that is only a share as far from a value inside, in few digits."""
+    far = middle + share * (end - middle)
+    rounded = float(np.ceil(far * 100) if far < middle else np.floor(far * 100)) / 100
+    return rounded if abs(rounded - end) < abs(middle - end) else middle
 
 
 def _quoted(text: str) -> str:

@@ -349,8 +349,8 @@ def _slot(scenario: LogicalScenario, name: str) -> tuple[str, dict[str, str]]:
     for word, kind in vocabulary()["kinds"].items():
         of_type = MODELS[kind].type if kind in MODELS else kind
         if kind is None:
-            fits = item.conduct == "vehicle"
-        elif item.type_by or item.own_body or item.model:
+            fits = item.conduct == "vehicle" and not item.siren
+        elif item.type_by or item.own_body or item.model or item.siren:
             fits = kind in (item.model, "" if item.model else item.type)
         else:
             fits = PARTICIPANTS[of_type].seen_as.conduct == item.conduct
@@ -500,9 +500,16 @@ def _two_meanings(name: str, readings: Iterable[tuple[Phrase, ...]]) -> str:
 
 def _not_understood(words: _Words, partly: list[tuple[int, str, list[Phrase]]]) -> Iterator[str]:
     if not partly:
+        known = {*re.findall(r"[^\W\d_]+(?:'s)?", repr(vocabulary())), "-"}
+        new = [
+            words.said(at, at + 1)
+            for at, word in enumerate(words.words)
+            if word.removesuffix("'s") not in known and not re.fullmatch(_NUMBER, word)
+        ]
         yield (
             f"no event of the catalogue is understood in '{words.text}'; one is needed, such as 'a "
-            "car cuts in' (docs/scenarios.md#a-scenario-from-a-sentence), or --like SCENARIO"
+            "car cuts in', or --like SCENARIO"
+            + (f"; unknown words: {', '.join(new)}" if new else "")
         )
         return
     most = max(count for count, _, _ in partly)
