@@ -73,8 +73,8 @@ def start_from_sentence(
         StorageError: as for `start_scenario`.
     """
     _refuse_name(name)
-    made = narrow(read_sentence(sentence, like), name)
-    return _write(name, made.text, folder), made.lines
+    text, lines = narrow(read_sentence(sentence, like), name)
+    return _write(name, text, folder), lines
 
 
 def _refuse_name(name: str) -> None:
