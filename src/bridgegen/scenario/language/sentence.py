@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.base.units import WRITTEN, in_unit
-from bridgegen.scenario.countries import COUNTRIES
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 from bridgegen.scenario.language.reader import load, names
 from bridgegen.scenario.language.scenario import LogicalScenario
@@ -33,53 +32,42 @@ _MOST = "at most|up to|no more than|less than|under|below"
 
 
 class Range(NamedTuple):
-    """Values that a sentence gives a parameter, in its unit; None: as far as the catalogue has it.
-
-    Attributes:
-        low: smallest value.
-        high: largest value.
-    """
+    """Values that a sentence gives a parameter, in its unit; None: as far as the catalogue has it."""
 
     low: float | None
     high: float | None
 
     def within(self, least: float, most: float) -> tuple[float, float] | None:
         """Return both ends, in a parameter's range; None: it has not all that is said."""
-        low, high = (least, most) if None in self else (self.low, self.high)
-        if self.low is not None:
-            low = max(low, self.low)
-        if self.high is not None:
-            high = min(high, self.high)
+        low = least if self.low is None else self.low
+        high = most if self.high is None else self.high
+        if None in self:
+            low, high = max(low, least), min(high, most)
         return (low, high) if least <= low <= high <= most else None
 
 
 class Given(NamedTuple):
-    """A value that a sentence gives.
-
-    Attributes:
-        key: of the scenario file, dotted.
-        value: what it is then; also where the catalogue's scenario is like that already.
-        said: the words that say so.
-    """
+    """A key of a scenario file, the value that a sentence gives it, and the words that do."""
 
     key: str
     value: Any
     said: str
 
 
-@dataclass(frozen=True)
-class Sentence:
+class Sentence(NamedTuple):
     """A sentence that was understood.
 
     Attributes:
         text: it.
         scenario: the scenario of the catalogue that it says.
-        given: what it gives: by key, each once.
+        given: by key, what it gives, also what the scenario is like already.
+        is_left: whether it says that traffic drives on the left.
     """
 
     text: str
     scenario: LogicalScenario
     given: Mapping[str, Given]
+    is_left: bool
 
 
 class _Pattern(NamedTuple):
@@ -125,7 +113,7 @@ def read_sentence(text: str, like: str | None = None) -> Sentence:
         raise InputError(f"a sentence has {MAX_LENGTH} characters at most, got {len(text)}")
     if like is not None and like not in names():
         raise UnknownNameError("scenario", like, names())
-    words, complete, partly = _Words(text), [], []
+    words, complete, partly = _Words(text), [], {}
     for name in (like,) if like else _candidates(words):
         scenario = load(name)
         matches = [match for pattern in _patterns(scenario) for match in words.matches(pattern)]
@@ -135,20 +123,28 @@ def read_sentence(text: str, like: str | None = None) -> Sentence:
             ways = sorted({f"{key}: {value}" for way in readings for key, value in way - common})
             raise InputError(f"'{text}' has two meanings in {name}: {' or '.join(ways)}")
         complete += [(scenario, reading) for reading in readings.values()]
-        partly.append((name, _longest(matches, len(words.words))))
+        partly[name] = words.left_by(matches)
+    if not complete and not partly:
+        known = {*re.findall(r"[^\W\d_]+", repr(vocabulary()))}
+        new = [word for word in words.words if not {*re.findall(r"[^\W\d_]+", word)} <= known]
+        raise InputError(
+            f"'{text}' says no event of the catalogue that is understood, such as 'a car cuts in'; "
+            f"unknown words: {', '.join(new) or 'none'}"
+        )
     if not complete:
-        raise InputError(_not_understood(words, partly))
+        least = min(partly.values())
+        of = ", ".join(name for name, left in partly.items() if left == least)
+        raise InputError(f"not understood: {least[1] or 'how its phrases fit together'} (of {of})")
     if len(complete) > 1:
         choice = "; ".join(f"{one.name} ({one.title})" for one, _ in complete)
         raise InputError(f"'{text}' may be: {choice}. Say more, or which one by --like")
     scenario, reading = complete[0]
-    return Sentence(text, scenario, _once(scenario, reading))
+    return Sentence(text, scenario, _once(scenario, reading), words.is_left)
 
 
 def _candidates(words: "_Words") -> Iterator[str]:
     """Yield the scenarios of which a sentence says an event, whoever takes part in it."""
-    kinds = "|".join(vocabulary()["kinds"])
-    anybody = rf"(?:{kinds})(?: (?:at|doing) \S*\d.*?)?"
+    anybody = rf"(?:{'|'.join(vocabulary()['kinds'])})(?: (?:at|doing) \S*\d.*?)?"
     for name, given in vocabulary()["scenarios"].items():
         events = (re.sub(r"\{\w+\}", lambda _: anybody, _plain(text)) for text in given["events"])
         if any(True for text in events for _ in words.matches(_Pattern(re.compile(text)))):
@@ -170,16 +166,14 @@ class _Words:
         self.text, self.spans = text, [item.span() for item in found]
         self.words = ["-" if item[0] in "–—" else item[0] for item in found]
         # Scenario files are written for traffic on the right: on the left, all is in the mirror.
-        for match in [match for pattern in _countries() for match in self.matches(pattern)]:
-            if any(COUNTRIES[v].traffic == "left" if k == "rules" else v == "left"
-                   for k, v in match.meaning):  # fmt: skip
-                other = {"left": "right", "right": "left"}
-                kept = range(match.first, match.last)
-                self.words = [
-                    word if at in kept else other.get(word, word)
-                    for at, word in enumerate(self.words)
-                ]
-                break
+        left = (one for one in _countries() if ("traffic", "left") in one.sets)
+        country = next((match for one in left for match in self.matches(one)), None)
+        self.is_left, other = country is not None, {"left": "right", "right": "left"}
+        if country is not None:
+            kept = range(country.first, country.last)
+            self.words = [
+                word if at in kept else other.get(word, word) for at, word in enumerate(self.words)
+            ]
 
     def said(self, first: int, last: int) -> str:
         """Return the words from one to before another, as the sentence has them."""
@@ -196,24 +190,28 @@ class _Words:
                     whole = self.said(first, last)
                     given = [Given(key, value, whole) for key, value in pattern.sets]
                     for group, (key, unit) in pattern.slots.items():
-                        if found[group] is not None:
-                            start, end = (found[0].count(" ", 0, at) for at in found.span(group))
-                            part = self.said(first + start, first + end + 1)
-                            given += _given(key, unit, found[group], part, whole, pattern.event)
+                        if (text := found[group]) is None:
+                            continue
+                        start, end = (found[0].count(" ", 0, at) for at in found.span(group))
+                        part = self.said(first + start, first + end + 1)
+                        if unit not in ("kind", "count"):
+                            part = part if pattern.event else whole
+                            given.append(Given(key, _range(text, unit), part))
+                        elif kind := vocabulary()[f"{unit}s"][text]:
+                            of_kind = ".model" if kind in MODELS else ".type"
+                            given.append(Given(key + of_kind * (unit == "kind"), kind, part))
                     yield _Match(first, last, pattern.event, tuple(given))
 
-
-def _given(
-    key: str, unit: str, text: str, part: str, whole: str, event: bool
-) -> Iterator[Given]:
-    """Yield what the words of a slot give."""
-    if unit == "kind":
-        if kind := vocabulary()["kinds"][text]:
-            yield Given(f"{key}.model" if kind in MODELS else f"{key}.type", kind, part)
-    elif unit == "count":
-        yield Given(key, vocabulary()["numbers"][text], whole)
-    else:
-        yield Given(key, _range(text, unit), part if event else whole)
+    def left_by(self, matches: Sequence[_Match]) -> tuple[int, str]:
+        """Return how many words the longest matches leave, with one event at most, and which."""
+        free, event = {*range(len(self.words))}, False
+        for item in sorted(matches, key=lambda item: (not item.event, item.first - item.last)):
+            if free.issuperset(range(item.first, item.last)) and not (item.event and event):
+                free -= {*range(item.first, item.last)}
+                event |= item.event
+        marks = "".join("x" if at in free else "." for at in range(len(self.words)))
+        runs = [f"'{self.said(*at.span())}'" for at in re.finditer("x+", marks)]
+        return len(free), ", ".join(runs)
 
 
 # --- Patterns ---
@@ -241,7 +239,7 @@ def _patterns(scenario: LogicalScenario) -> Iterator[_Pattern]:
             if at[1] == "n":
                 slots["count"] = ("roads.lanes", "count")
                 can = given.get("lanes", [scenario.roads.knobs["lanes"]])
-                spoken = [word for word, number in known["numbers"].items() if number in can]
+                spoken = [word for word, number in known["counts"].items() if number in can]
                 return f"(?P<count>{'|'.join(spoken)})"
             if at[1]:
                 slots.update(people[at[1]][1])
@@ -277,22 +275,18 @@ def _patterns(scenario: LogicalScenario) -> Iterator[_Pattern]:
             spoken = "EGO" if item.name == "ego" else f"{{{item.name}}}"
             yield pattern(f"{spoken}( DRIVES)?( at)? {{}}", (), str(item.speed))
     yield from _countries()
-    for key, value, fact in _facts(scenario):
-        yield from (pattern(text, ((key, value),)) for text in known["roads"].get(fact, ()))
-    if not scenario.roads.knobs.get("lanes_against", 1):
-        yield from (pattern(text) for text in known["lanes"])
-
-
-def _facts(scenario: LogicalScenario) -> Iterator[tuple[str, str, str]]:
-    """Yield what the road of a scenario is like already: a key, its value, what it is called."""
     roads = scenario.roads
-    kind = "motorway" if roads.template == "merge" else roads.road_type
-    yield "roads.road_type", kind, kind
-    yield "template", roads.template, roads.template
-    if roads.template == "crossroads":
-        yield "roads.signals", roads.signals, "plain" if roads.signals == "none" else "signals"
-    elif roads.template == "road":
-        yield "roads.segments", *(("bent", "bend") if roads.segments[1:] else ("straight",) * 2)
+    facts = {
+        "roads.road_type": "motorway" if roads.template == "merge" else roads.road_type,
+        "template": roads.template,
+        "roads.signals": f"{roads.template} {roads.signals}",
+        "roads.segments": f"{roads.template} {'bend' if roads.segments[1:] else 'straight'}",
+    }  # as the road is already
+    for key, fact in facts.items():
+        value = fact.split(" ")[-1]
+        yield from (pattern(text, ((key, value),)) for text in known["roads"].get(fact, ()))
+    if not roads.knobs.get("lanes_against", 1):
+        yield from (pattern(text) for text in known["lanes"])
 
 
 def _countries() -> Iterator[_Pattern]:
@@ -376,36 +370,6 @@ def _readings(
         for reading in found
         if len(reading) == fewest
     }
-
-
-def _longest(matches: Sequence[_Match], count: int) -> list[_Match]:
-    """Return matches that cover what they can, from left to right, one event first."""
-    found: list[_Match] = []
-    free = set(range(count))
-    for item in sorted(matches, key=lambda item: (not item.event, item.first - item.last)):
-        if free.issuperset(range(item.first, item.last)) and not (item.event and found):
-            found.append(item)
-            free -= {*range(item.first, item.last)}
-    return found
-
-
-def _not_understood(words: _Words, partly: Sequence[tuple[str, list[_Match]]]) -> str:
-    if not partly:
-        known = {*re.findall(r"[^\W\d_]+", repr(vocabulary()))}
-        new = [word for word in words.words if not {*re.findall(r"[^\W\d_]+", word)} <= known]
-        return (
-            f"'{words.text}' says no event of the catalogue that is understood, such as 'a car "
-            f"cuts in'; unknown words: {', '.join(new) or 'none'}"
-        )
-    texts = {}
-    for name, found in partly:
-        covered = {at for item in found for at in range(item.first, item.last)}
-        left = "".join("." if at in covered else "x" for at in range(len(words.words)))
-        runs = [words.said(*at.span()) for at in re.finditer("x+", left)]
-        texts[name] = (left.count("x"), ", ".join(f"'{run}'" for run in runs))
-    least = min(texts.values())
-    of = ", ".join(name for name, text in texts.items() if text == least)
-    return f"not understood: {least[1] or 'how the phrases go together'} (of {of})"
 
 
 def _once(scenario: LogicalScenario, reading: Sequence[_Match]) -> dict[str, Given]:
