@@ -273,7 +273,9 @@ def new(
         path, lines = start_from_sentence(name, says, like=like)
         print(*lines, sep="\n")
         mark = "# "  # all that is printed is YAML
-    print(f"{mark}{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
+    print(
+        f"{mark}{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'"
+    )
 
 
 @app.command()

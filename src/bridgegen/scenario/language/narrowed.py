@@ -17,7 +17,7 @@ from bridgegen.scenario.countries import in_the_mirror
 from bridgegen.scenario.language.constraints import Constraints
 from bridgegen.scenario.language.expression import parse
 from bridgegen.scenario.language.parameters import Axis, Bound
-from bridgegen.scenario.language.plain_yaml import Document
+from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
 from bridgegen.scenario.language.reader import build, document_of
 from bridgegen.scenario.language.rules import speeds_of
 from bridgegen.scenario.language.sentence import Range, Sentence
@@ -60,10 +60,24 @@ def narrow(sentence: Sentence, name: str) -> tuple[str, tuple[str, ...]]:
         words = f'"{said}"' + (f"; {words}" if words else "")
         limits[parameter.name] = (low, high, words)
         data, limits = _narrowed(sentence, name, limits, reasons)
-    text = yaml.safe_dump(
-        data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
+    lines = (*_lines(sentence, limits), *(f"# {_NARROWED}, else: {text}" for text in reasons))
+    text = "".join(f"# {line.removeprefix('# ')}\n" for line in lines) + yaml.dump(
+        data,
+        Dumper=_Dumper,
+        sort_keys=False,
+        allow_unicode=True,
+        default_flow_style=None,
+        width=100,
     )
-    return text, (*_lines(sentence, limits), *(f"# {_NARROWED}, else: {text}" for text in reasons))
+    build(read_plain_yaml(text.encode(), f"{name}.yaml"), None)
+    return text, lines
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes texts without the ends of lines that folded ones have."""
+
+
+_Dumper.add_representer(str, lambda dumper, text: dumper.represent_str(text.strip()))
 
 
 def _of_bodies(sentence: Sentence) -> _Limits:
@@ -124,9 +138,7 @@ def _file(sentence: Sentence, name: str, limits: _Limits) -> dict[str, Any]:
         else:
             parameters[key] = replace(parameter, default=default)
             bounds.append(Bound(key, parse(repr(low)), parse(repr(high)), "said", "said"))
-    rules = Constraints(
-        parameters, (*scenario.bounds, *bounds), scenario.derived, scenario.axes
-    )
+    rules = Constraints(parameters, (*scenario.bounds, *bounds), scenario.derived, scenario.axes)
     # What breaks a rule is found here in a tenth of the time that a file takes.
     space = SearchSpace(rules, Axis)
     data = _data(sentence, name, limits, space.values(space.row({})))
@@ -174,12 +186,17 @@ def _lines(sentence: Sentence, limits: _Limits) -> list[str]:
             unit = "" if item.unit in ("1", "count") else f" {item.unit}"
             both = f"{low:g}{unit}" if low == high else f"{low:g} to {high:g}{unit}"
             rows[f"parameters.{name}"] = (both, words)
-    rows["like"] = (sentence.scenario.name, f"{rows.get('like', ('', ''))[1]} {sentence.scenario.title}".strip())
+    rows["like"] = (
+        sentence.scenario.name,
+        f"{rows.get('like', ('', ''))[1]} {sentence.scenario.title}".strip(),
+    )
     for key, (value, words) in rows.items():
         if key.startswith("participants."):
             new, old = body_of(value), sentence.scenario.participant(key.split(".")[1]).body
             if (new.front, new.rear) != (old.front, old.rear):
-                ends = f"{new.front:.1f} and {new.rear:.1f} m, not {old.front:.1f} and {old.rear:.1f}"
+                ends = (
+                    f"{new.front:.1f} and {new.rear:.1f} m, not {old.front:.1f} and {old.rear:.1f}"
+                )
                 rows[key] = (value, f"{words}; reaches {ends} m from its reference point")
     wide = max(len(f"{key}: {value}") for key, (value, _) in rows.items())
     return [f"{f'{key}: {value}':{wide}}  # {words}" for key, (value, words) in rows.items()]

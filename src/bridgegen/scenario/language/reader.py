@@ -340,12 +340,11 @@ class _Declarations:
                 f"{at(place)}"
             )
         if given.only is not None:
-            low = high = kind.read(given.only, low, high) if kind.names else None
-            if low is None or default != low:
-                choice = f"one of {', '.join(kind.names)}" if kind.names else "none without values"
+            low = high = default
+            if not kind.names or kind.read(given.only, low, high) != default:
                 raise ScenarioError(
-                    f"parameters.{name}.only must be {choice}, and its default, "
-                    f"got {given.only!r}, default {given.default!r}{at(place)}"
+                    f"parameters.{name}.only must be the default of a category, got {given.only!r}"
+                    f"{at(place)}"
                 )
         self.parameters.append(
             Parameter(

@@ -6,7 +6,6 @@ cover all of its words but those that the file ignores, in one way; the rest is 
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any, NamedTuple
@@ -21,7 +20,7 @@ from bridgegen.scenario.named_models import MODELS
 from bridgegen.scenario.participants import PARTICIPANTS
 
 MAX_LENGTH = 400
-_MOST_READINGS = 500
+_MOST_READINGS = 20
 _TOKEN = re.compile(
     r"\d[\d.]*,\d[\d.,]*|(?<![\w.])[-+]\d+(?:\.\d+)?|\d+(?:\.\d+)?"
     r"|m/s(?:²|2|\^2)|[^\W\d_]+/[^\W\d_]+|[^\W\d_]+(?:'s)?|\S"
@@ -32,7 +31,7 @@ _MOST = "at most|up to|no more than|less than|under|below"
 
 
 class Range(NamedTuple):
-    """Values that a sentence gives a parameter, in its unit; None: as far as the catalogue has it."""
+    """Values that are said of a parameter, in its unit; None: as far as the catalogue has it."""
 
     low: float | None
     high: float | None
@@ -55,14 +54,7 @@ class Given(NamedTuple):
 
 
 class Sentence(NamedTuple):
-    """A sentence that was understood.
-
-    Attributes:
-        text: it.
-        scenario: the scenario of the catalogue that it says.
-        given: by key, what it gives, also what the scenario is like already.
-        is_left: whether it says that traffic drives on the left.
-    """
+    """A sentence, the scenario that it says, what it gives by key, and whether traffic is left."""
 
     text: str
     scenario: LogicalScenario
@@ -83,9 +75,8 @@ class _Match(NamedTuple):
     event: bool
     given: tuple[Given, ...]
 
-    @property
-    def meaning(self) -> frozenset[tuple[str, Any]]:
-        return frozenset((key, value) for key, value, _ in self.given)
+
+_Reading = tuple[_Match, ...]
 
 
 @cache
@@ -119,27 +110,28 @@ def read_sentence(text: str, like: str | None = None) -> Sentence:
         matches = [match for pattern in _patterns(scenario) for match in words.matches(pattern)]
         readings = _readings(matches, len(words.words), needs_event=like is None)
         if len(readings) > 1:
-            common = frozenset.intersection(*readings)
-            ways = sorted({f"{key}: {value}" for way in readings for key, value in way - common})
-            raise InputError(f"'{text}' has two meanings in {name}: {' or '.join(ways)}")
-        complete += [(scenario, reading) for reading in readings.values()]
+            meant = [_meaning(reading) for reading in readings]
+            ways = set().union(*meant) - meant[0].intersection(*meant)
+            told = " or ".join(sorted(f"{key}: {value}" for key, value in ways))
+            raise InputError(f"'{text}' has two meanings in {name}: {told}")
+        complete += [(scenario, reading) for reading in readings]
         partly[name] = words.left_by(matches)
-    if not complete and not partly:
-        known = {*re.findall(r"[^\W\d_]+", repr(vocabulary()))}
-        new = [word for word in words.words if not {*re.findall(r"[^\W\d_]+", word)} <= known]
-        raise InputError(
-            f"'{text}' says no event of the catalogue that is understood, such as 'a car cuts in'; "
-            f"unknown words: {', '.join(new) or 'none'}"
-        )
-    if not complete:
-        least = min(partly.values())
-        of = ", ".join(name for name, left in partly.items() if left == least)
-        raise InputError(f"not understood: {least[1] or 'how its phrases fit together'} (of {of})")
     if len(complete) > 1:
         choice = "; ".join(f"{one.name} ({one.title})" for one, _ in complete)
         raise InputError(f"'{text}' may be: {choice}. Say more, or which one by --like")
-    scenario, reading = complete[0]
-    return Sentence(text, scenario, _once(scenario, reading), words.is_left)
+    if complete:
+        scenario, reading = complete[0]
+        return Sentence(text, scenario, _once(scenario, reading), words.is_left)
+    if partly:
+        least = min(partly.values())
+        of = ", ".join(name for name, left in partly.items() if left == least)
+        raise InputError(f"not understood: {least[1] or 'how its phrases fit together'} (of {of})")
+    known = {*re.findall(r"[^\W\d_]+", repr(vocabulary()))}
+    new = [word for word in words.words if not {*re.findall(r"[^\W\d_]+", word)} <= known]
+    raise InputError(
+        f"'{text}' says no event of the catalogue that is understood, such as 'a car cuts in'; "
+        f"unknown words: {', '.join(new) or 'none'}"
+    )
 
 
 def _candidates(words: "_Words") -> Iterator[str]:
@@ -149,9 +141,6 @@ def _candidates(words: "_Words") -> Iterator[str]:
         events = (re.sub(r"\{\w+\}", lambda _: anybody, _plain(text)) for text in given["events"])
         if any(True for text in events for _ in words.matches(_Pattern(re.compile(text)))):
             yield name
-
-
-# --- Words, and where patterns match them ---
 
 
 class _Words:
@@ -187,20 +176,24 @@ class _Words:
             for last in range(first + count, first, -1):
                 found = pattern.regex.fullmatch(" ".join(self.words[first:last]))
                 if found is not None:
-                    whole = self.said(first, last)
-                    given = [Given(key, value, whole) for key, value in pattern.sets]
-                    for group, (key, unit) in pattern.slots.items():
-                        if (text := found[group]) is None:
-                            continue
-                        start, end = (found[0].count(" ", 0, at) for at in found.span(group))
-                        part = self.said(first + start, first + end + 1)
-                        if unit not in ("kind", "count"):
-                            part = part if pattern.event else whole
-                            given.append(Given(key, _range(text, unit), part))
-                        elif kind := vocabulary()[f"{unit}s"][text]:
-                            of_kind = ".model" if kind in MODELS else ".type"
-                            given.append(Given(key + of_kind * (unit == "kind"), kind, part))
+                    given = [Given(*pair, self.said(first, last)) for pair in pattern.sets]
+                    given += self._slots(pattern, found, first, last)
                     yield _Match(first, last, pattern.event, tuple(given))
+
+    def _slots(
+        self, pattern: _Pattern, found: "re.Match[str]", first: int, last: int
+    ) -> Iterator[Given]:
+        for group, (key, unit) in pattern.slots.items():
+            if (text := found[group]) is None:
+                continue
+            start, end = (found[0].count(" ", 0, at) for at in found.span(group))
+            part = self.said(first + start, first + end + 1)
+            if unit == "kind":
+                if kind := vocabulary()["kinds"][text]:
+                    yield Given(f"{key}.{'model' if kind in MODELS else 'type'}", kind, part)
+            else:
+                value = vocabulary()["counts"][text] if unit == "count" else _range(text, unit)
+                yield Given(key, value, part if pattern.event else self.said(first, last))
 
     def left_by(self, matches: Sequence[_Match]) -> tuple[int, str]:
         """Return how many words the longest matches leave, with one event at most, and which."""
@@ -212,9 +205,6 @@ class _Words:
         marks = "".join("x" if at in free else "." for at in range(len(self.words)))
         runs = [f"'{self.said(*at.span())}'" for at in re.finditer("x+", marks)]
         return len(free), ", ".join(runs)
-
-
-# --- Patterns ---
 
 
 def _plain(text: str) -> str:
@@ -298,25 +288,20 @@ def _participant(
     scenario: LogicalScenario, item: Participant
 ) -> tuple[str, dict[str, tuple[str, str]]]:
     """Return what may be said for a participant, its kind and its speed, and the keys of that."""
-    own = item.type_by or item.own_body or item.model or item.siren
-    words = [
-        word
-        for word, kind in vocabulary()["kinds"].items()
-        if (kind == (item.model or item.type) if own else item.conduct == (
-            PARTICIPANTS[MODELS[kind].type if kind in MODELS else kind].seen_as.conduct
-            if kind else "vehicle"
-        ))
-    ]  # fmt: skip
+    words = []
+    for word, kind in vocabulary()["kinds"].items():
+        if item.type_by or item.own_body or item.model or item.siren:
+            fits = kind == (item.model or item.type)
+        else:
+            of = MODELS[kind].type if kind in MODELS else kind or "car"
+            fits = PARTICIPANTS[of].seen_as.conduct == item.conduct
+        words += [word] * fits
     text = f"(?P<{item.name}>{'|'.join(words) or '(?!)'})"
     slots = {item.name: (f"participants.{item.name}", "kind")}
-    if item.speed in scenario.parameters:
-        parameter = scenario.parameters[str(item.speed)]
+    if (parameter := scenario.parameters.get(str(item.speed))) is not None:
         text += f"(?: (?:at|doing) (?P<{item.name}_speed>{_quantity(parameter.unit)}))?"
         slots[f"{item.name}_speed"] = (f"parameters.{parameter.name}", parameter.unit)
     return text, slots
-
-
-# --- Quantities ---
 
 
 def _symbols(unit: str) -> dict[str, str]:
@@ -345,31 +330,31 @@ def _range(text: str, unit: str) -> Range:
     return Range(None, values[0]) if re.match(_MOST, text) else Range(values[0], values[-1])
 
 
-# --- From matches to a reading, and what is refused ---
+def _meaning(reading: _Reading) -> frozenset[tuple[str, Any]]:
+    return frozenset((item.key, item.value) for match in reading for item in match.given)
 
 
-def _readings(
-    matches: Sequence[_Match], count: int, *, needs_event: bool
-) -> dict[frozenset[tuple[str, Any]], tuple[_Match, ...]]:
-    """Return in which ways matches cover all words, by what they mean; with the fewest matches."""
-    found: list[tuple[_Match, ...]] = []
-    unfinished: list[tuple[_Match, ...]] = [()]
-    while unfinished and len(found) < _MOST_READINGS:
-        reading = unfinished.pop()
-        at, events = reading[-1].last if reading else 0, any(item.event for item in reading)
-        if at == count and (events or (reading and not needs_event)):
-            found.append(reading)
-        unfinished += [
-            (*reading, item)
-            for item in matches
-            if item.first == at and not (item.event and events)
-        ][:_MOST_READINGS]
-    fewest = min(map(len, found), default=0)
-    return {
-        frozenset().union(*(item.meaning for item in reading)): reading
-        for reading in found
-        if len(reading) == fewest
-    }
+def _readings(matches: Sequence[_Match], count: int, *, needs_event: bool) -> list[_Reading]:
+    """Return the readings that cover all words by the fewest matches, one of each meaning."""
+    # By how many words are behind, and whether an event is.
+    best: dict[tuple[int, bool], list[_Reading]] = {(0, False): [()]}
+    for item in sorted(matches, key=lambda item: item.first):
+        for event in (False, True):
+            for reading in best.get((item.first, event), ()):
+                if item.event and event:
+                    continue
+                others = best.setdefault((item.last, event or item.event), [])
+                new = (*reading, item)
+                if others and len(new) < len(others[0]):
+                    others.clear()
+                if not others or (
+                    len(new) == len(others[0])
+                    and len(others) < _MOST_READINGS
+                    and _meaning(new) not in map(_meaning, others)
+                ):
+                    others.append(new)
+    found = best.get((count, True), [])
+    return found if needs_event or not count else found or best.get((count, False), [])
 
 
 def _once(scenario: LogicalScenario, reading: Sequence[_Match]) -> dict[str, Given]:

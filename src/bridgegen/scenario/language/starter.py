@@ -57,20 +57,17 @@ def start_from_sentence(
     """Write ``NAME.yaml``, the scenario of the catalogue that a sentence says, and its schema.
 
     Args:
-        name: as for `start_scenario`.
-        sentence: what happens; see ``scenario/phrases.yaml``.
+        name: as of `start_scenario`.
+        sentence: see `bridgegen.scenario.language.sentence`.
         like: the scenario of the catalogue that it is about; by default it says so itself.
-        folder: as for `start_scenario`.
+        folder: as of `start_scenario`.
 
     Returns:
-        The file, and what was understood, as lines of YAML: a key and its value, and the words of
-        the sentence in a comment.
+        The file, and what was understood, see `bridgegen.scenario.language.narrowed.narrow`.
 
     Raises:
-        InputError: the name is no word; a part of the sentence is not understood, has two
-            meanings, or is not possible in the scenario.
-        UnknownNameError: no such scenario.
-        StorageError: as for `start_scenario`.
+        InputError: the name is no word; or the sentence is not understood, or not possible.
+        StorageError: as of `start_scenario`.
     """
     _refuse_name(name)
     text, lines = narrow(read_sentence(sentence, like), name)
