@@ -5,6 +5,7 @@ import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -258,24 +259,19 @@ def new(
     says: Annotated[
         str | None,
         typer.Option(
-            help="Start from the catalogue scenario that this sentence says, in controlled "
-            "English; prints each phrase beside its key, refuses what is not understood."
+            help="Start from a sentence in controlled English, such as 'a car cuts in 20 m ahead'; "
+            "prints each phrase beside its key, and refuses what is not understood."
         ),
     ] = None,
 ) -> None:
     """Write a commented scenario file to start from."""
-    from bridgegen.scenario.language.starter import start_from_sentence, start_scenario
+    from bridgegen.scenario.language.starter import start_scenario
 
-    mark = ""
-    if says is None:
-        path = start_scenario(name, like=like)
-    else:
-        path, lines = start_from_sentence(name, says, like=like)
-        print(*lines, sep="\n")
-        mark = "# "  # all that is printed is YAML
-    print(
-        f"{mark}{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'"
-    )
+    path = start_scenario(name, like=like, says=says)
+    if says is not None:
+        head = takewhile(lambda line: line.startswith("# "), path.read_text("utf-8").splitlines())
+        print(*(line.removeprefix("# ") for line in head), sep="\n")
+    print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
 
 
 @app.command()

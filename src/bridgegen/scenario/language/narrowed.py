@@ -20,7 +20,7 @@ from bridgegen.scenario.language.parameters import Axis, Bound
 from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
 from bridgegen.scenario.language.reader import build, document_of
 from bridgegen.scenario.language.rules import speeds_of
-from bridgegen.scenario.language.sentence import Range, Sentence
+from bridgegen.scenario.language.sentence import Sentence
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.scenario.named_models import body_of
 
@@ -30,16 +30,11 @@ _NARROWED = "narrowed for the rest"
 _Limits = dict[str, tuple[float, float, str]]  # by parameter: low, high, and the words
 
 
-def narrow(sentence: Sentence, name: str) -> tuple[str, tuple[str, ...]]:
-    """Return the scenario that a sentence says, as a file.
+def narrow(sentence: Sentence, name: str) -> str:
+    """Return the scenario that a sentence says, as the text of a file.
 
-    Args:
-        sentence: it.
-        name: of the new scenario.
-
-    Returns:
-        The file's text, and what was understood as lines of YAML: a key and its value, and the
-        words of the sentence in a comment.
+    At its head stands what was understood, in comments: lines of YAML, a key and its value, with
+    the words of the sentence.
 
     Raises:
         InputError: the scenario cannot be like that; says which of its rules is in the way.
@@ -48,33 +43,25 @@ def narrow(sentence: Sentence, name: str) -> tuple[str, tuple[str, ...]]:
     # One after the other: what each makes necessary is found apart.
     data, limits = _narrowed(sentence, name, limits, reasons)
     for key, value, said in sentence.given.values():
-        parameter = scenario.parameters.get(key.removeprefix("parameters."))
-        if parameter is None:
+        item = scenario.parameters.get(key.removeprefix("parameters."))
+        if item is None:
             continue
-        low, high, words = limits.get(parameter.name, (parameter.low, parameter.high, ""))
-        if isinstance(value, Range):
-            ends = value.within(parameter.low, parameter.high) or (low, high)
-            low, high = max(low, ends[0]), min(high, ends[1])
-        else:
-            low = high = parameter.read(value)
+        low, high, words = limits.get(item.name, (item.low, item.high, ""))
+        ends = (item.read(value),) * 2 if isinstance(value, str) else value.within(item)
         words = f'"{said}"' + (f"; {words}" if words else "")
-        limits[parameter.name] = (low, high, words)
+        limits[item.name] = (max(low, ends[0]), min(high, ends[1]), words)
         data, limits = _narrowed(sentence, name, limits, reasons)
-    lines = (*_lines(sentence, limits), *(f"# {_NARROWED}, else: {text}" for text in reasons))
-    text = "".join(f"# {line.removeprefix('# ')}\n" for line in lines) + yaml.dump(
-        data,
-        Dumper=_Dumper,
-        sort_keys=False,
-        allow_unicode=True,
-        default_flow_style=None,
-        width=100,
+    lines = [*_lines(sentence, limits), *(f"# {_NARROWED}, else: {text}" for text in reasons)]
+    text = "".join(f"# {line}\n" for line in lines)
+    text += yaml.dump(
+        data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, default_flow_style=None, width=99
     )
     build(read_plain_yaml(text.encode(), f"{name}.yaml"), None)
-    return text, lines
+    return text
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes texts without the ends of lines that folded ones have."""
+    """Writes texts without the end of the line that folded ones have."""
 
 
 _Dumper.add_representer(str, lambda dumper, text: dumper.represent_str(text.strip()))
@@ -96,7 +83,7 @@ def _of_bodies(sentence: Sentence) -> _Limits:
 
 def _narrowed(
     sentence: Sentence, name: str, limits: _Limits, reasons: list[str]
-) -> tuple[dict[str, Any], _Limits]:
+) -> tuple[Any, _Limits]:
     """Return a file with some limits, and those that it needs; adds the reason of more.
 
     Raises:
@@ -123,7 +110,7 @@ def _narrowed(
     raise InputError(f"{sentence.scenario.name} cannot be as '{sentence.text}' says: {problem}")
 
 
-def _file(sentence: Sentence, name: str, limits: _Limits) -> dict[str, Any]:
+def _file(sentence: Sentence, name: str, limits: _Limits) -> Any:
     """Return what a file with some limits holds.
 
     Raises:
@@ -146,10 +133,8 @@ def _file(sentence: Sentence, name: str, limits: _Limits) -> dict[str, Any]:
     return data
 
 
-def _data(
-    sentence: Sentence, name: str, limits: _Limits, defaults: Mapping[str, float]
-) -> dict[str, Any]:
-    data: dict[str, Any] = copy.deepcopy(document_of(sentence.scenario.name)[0].data)  # type: ignore[assignment]
+def _data(sentence: Sentence, name: str, limits: _Limits, defaults: Mapping[str, float]) -> Any:
+    data: Any = copy.deepcopy(document_of(sentence.scenario.name)[0].data)
     told = in_the_mirror if sentence.is_left else str  # as the file of a mirror image is written
     said = sentence.text.strip()
     data |= {"scenario": name, "title": told(said[:1].upper() + said[1:])}
@@ -178,25 +163,21 @@ def _data(
 
 def _lines(sentence: Sentence, limits: _Limits) -> list[str]:
     """Return what was understood, and what was narrowed for it."""
-    parameters = sentence.scenario.parameters
-    rows = {key: (value, f'"{said}"') for key, value, said in sentence.given.values()}
+    scenario = sentence.scenario
+    rows: dict[str, tuple[object, str]] = {"like": (scenario.name, "")}
+    rows |= {key: (value, f'"{said}"') for key, value, said in sentence.given.values()}
+    rows["like"] = (scenario.name, f"{rows['like'][1]} {scenario.title}".lstrip())
     for name, (low, high, words) in limits.items():
-        item = parameters[name]
+        item = scenario.parameters[name]
         if not item.kind.names:
-            unit = "" if item.unit in ("1", "count") else f" {item.unit}"
-            both = f"{low:g}{unit}" if low == high else f"{low:g} to {high:g}{unit}"
-            rows[f"parameters.{name}"] = (both, words)
-    rows["like"] = (
-        sentence.scenario.name,
-        f"{rows.get('like', ('', ''))[1]} {sentence.scenario.title}".strip(),
-    )
+            both = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+            rows[f"parameters.{name}"] = (f"{both} {item.unit}", words)
     for key, (value, words) in rows.items():
         if key.startswith("participants."):
-            new, old = body_of(value), sentence.scenario.participant(key.split(".")[1]).body
+            new, old = body_of(str(value)), scenario.participant(key.split(".")[1]).body
             if (new.front, new.rear) != (old.front, old.rear):
-                ends = (
-                    f"{new.front:.1f} and {new.rear:.1f} m, not {old.front:.1f} and {old.rear:.1f}"
-                )
-                rows[key] = (value, f"{words}; reaches {ends} m from its reference point")
+                words += f"; from its reference point to its front {new.front:.1f} m (as shipped "
+                words += f"{old.front:.1f} m), to its rear {new.rear:.1f} m ({old.rear:.1f} m)"
+                rows[key] = (value, words)
     wide = max(len(f"{key}: {value}") for key, (value, _) in rows.items())
     return [f"{f'{key}: {value}':{wide}}  # {words}" for key, (value, words) in rows.items()]

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.base.units import WRITTEN, in_unit
+from bridgegen.scenario.language.parameters import Parameter
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 from bridgegen.scenario.language.reader import load, names
 from bridgegen.scenario.language.scenario import LogicalScenario
@@ -36,13 +37,22 @@ class Range(NamedTuple):
     low: float | None
     high: float | None
 
-    def within(self, least: float, most: float) -> tuple[float, float] | None:
-        """Return both ends, in a parameter's range; None: it has not all that is said."""
-        low = least if self.low is None else self.low
-        high = most if self.high is None else self.high
-        if None in self:
+    def within(self, parameter: Parameter) -> tuple[float, float]:
+        """Return both ends, in a parameter's range.
+
+        Raises:
+            InputError: the parameter has not all that is said.
+        """
+        least, most = parameter.low, parameter.high
+        low, high = (
+            end if said is None else said for end, said in zip((least, most), self, strict=True)
+        )
+        if None in self:  # at least so much, at most so much: also of a range within
             low, high = max(low, least), min(high, most)
-        return (low, high) if least <= low <= high <= most else None
+        if not least <= low <= high <= most:
+            unit, got = parameter.unit, f"{low:g}" if low == high else f"{low:g} to {high:g}"
+            raise InputError(f"{parameter.name} [{unit}] is {least:g} to {most:g}, got {got}")
+        return low, high
 
 
 class Given(NamedTuple):
@@ -63,9 +73,8 @@ class Sentence(NamedTuple):
 
 
 class _Pattern(NamedTuple):
-    regex: "re.Pattern[str]"
+    regex: "re.Pattern[str]"  # its groups: WHAT__NAME, a kind, count or quantity of something
     sets: Sequence[tuple[str, Any]] = ()
-    slots: Mapping[str, tuple[str, str]] = {}  # group → the key that it gives, its unit
     event: bool = False
 
 
@@ -107,7 +116,9 @@ def read_sentence(text: str, like: str | None = None) -> Sentence:
     words, complete, partly = _Words(text), [], {}
     for name in (like,) if like else _candidates(words):
         scenario = load(name)
-        matches = [match for pattern in _patterns(scenario) for match in words.matches(pattern)]
+        matches = [
+            match for pattern in _patterns(scenario) for match in words.matches(pattern, scenario)
+        ]
         readings = _readings(matches, len(words.words), needs_event=like is None)
         if len(readings) > 1:
             meant = [_meaning(reading) for reading in readings]
@@ -121,7 +132,7 @@ def read_sentence(text: str, like: str | None = None) -> Sentence:
         raise InputError(f"'{text}' may be: {choice}. Say more, or which one by --like")
     if complete:
         scenario, reading = complete[0]
-        return Sentence(text, scenario, _once(scenario, reading), words.is_left)
+        return Sentence(text, scenario, _once(reading), words.is_left)
     if partly:
         least = min(partly.values())
         of = ", ".join(name for name, left in partly.items() if left == least)
@@ -168,32 +179,34 @@ class _Words:
         """Return the words from one to before another, as the sentence has them."""
         return self.text[self.spans[first][0] : self.spans[last - 1][1]]
 
-    def matches(self, pattern: _Pattern) -> Iterator[_Match]:
+    def matches(
+        self, pattern: _Pattern, scenario: LogicalScenario | None = None
+    ) -> Iterator[_Match]:
         """Yield where a pattern matches, each length that it can have."""
         for first in range(len(self.words)):
             longest = pattern.regex.match(" ".join(self.words[first:]))
             count = longest[0].count(" ") + 1 if longest and longest[0] else 0
             for last in range(first + count, first, -1):
                 found = pattern.regex.fullmatch(" ".join(self.words[first:last]))
-                if found is not None:
-                    given = [Given(*pair, self.said(first, last)) for pair in pattern.sets]
-                    given += self._slots(pattern, found, first, last)
-                    yield _Match(first, last, pattern.event, tuple(given))
-
-    def _slots(
-        self, pattern: _Pattern, found: "re.Match[str]", first: int, last: int
-    ) -> Iterator[Given]:
-        for group, (key, unit) in pattern.slots.items():
-            if (text := found[group]) is None:
-                continue
-            start, end = (found[0].count(" ", 0, at) for at in found.span(group))
-            part = self.said(first + start, first + end + 1)
-            if unit == "kind":
-                if kind := vocabulary()["kinds"][text]:
-                    yield Given(f"{key}.{'model' if kind in MODELS else 'type'}", kind, part)
-            else:
-                value = vocabulary()["counts"][text] if unit == "count" else _range(text, unit)
-                yield Given(key, value, part if pattern.event else self.said(first, last))
+                if found is None:
+                    continue
+                whole = self.said(first, last)
+                given = [Given(key, value, whole) for key, value in pattern.sets]
+                for group, text in found.groupdict().items():
+                    what, _, name = group.partition("__")
+                    if text is None or scenario is None:
+                        continue
+                    start, end = (first + found[0].count(" ", 0, at) for at in found.span(group))
+                    part = self.said(start, end + 1) if pattern.event else whole
+                    if what == "count":
+                        given.append(Given("roads.lanes", vocabulary()["counts"][text], part))
+                    elif what != "kind":
+                        value = _range(text, scenario.parameters[name].unit)
+                        given.append(Given(f"parameters.{name}", value, part))
+                    elif kind := vocabulary()["kinds"][text]:
+                        key = f"participants.{name}.{'model' if kind in MODELS else 'type'}"
+                        given.append(Given(key, kind, part))
+                yield _Match(first, last, pattern.event, tuple(given))
 
     def left_by(self, matches: Sequence[_Match]) -> tuple[int, str]:
         """Return how many words the longest matches leave, with one event at most, and which."""
@@ -223,22 +236,13 @@ def _patterns(scenario: LogicalScenario) -> Iterator[_Pattern]:
     def pattern(
         text: str, sets: Sequence[tuple[str, Any]] = (), of: str = "", event: bool = False
     ) -> _Pattern:
-        slots: dict[str, tuple[str, str]] = {}
-
-        def filled(at: "re.Match[str]") -> str:
-            if at[1] == "n":
-                slots["count"] = ("roads.lanes", "count")
-                can = given.get("lanes", [scenario.roads.knobs["lanes"]])
-                spoken = [word for word, number in known["counts"].items() if number in can]
-                return f"(?P<count>{'|'.join(spoken)})"
-            if at[1]:
-                slots.update(people[at[1]][1])
-                return people[at[1]][0]
-            unit = scenario.parameters[of].unit
-            slots["value"] = (f"parameters.{of}", unit)
-            return f"(?P<value>{_quantity(unit)})"
-
-        return _Pattern(re.compile(re.sub(r"\{(\w*)\}", filled, _plain(text))), sets, slots, event)
+        fill = {"": _quantity(scenario.parameters[of])} if of else {}
+        if "{n}" in text:
+            can = given.get("lanes", [scenario.roads.knobs["lanes"]])
+            spoken = [word for word, number in known["counts"].items() if number in can]
+            fill["n"] = f"(?P<count__>{'|'.join(spoken)})"
+        text = re.sub(r"\{(\w*)\}", lambda at: (people | fill)[at[1]], _plain(text))
+        return _Pattern(re.compile(text), sets, event)
 
     yield from (pattern(text, like, event=True) for text in given["events"])
     for text in (*given.get("also", ()), *known["ego"].get(given.get("ego", ""), ())):
@@ -284,10 +288,8 @@ def _countries() -> Iterator[_Pattern]:
         yield _Pattern(re.compile(_plain(text)), tuple(values.items()))
 
 
-def _participant(
-    scenario: LogicalScenario, item: Participant
-) -> tuple[str, dict[str, tuple[str, str]]]:
-    """Return what may be said for a participant, its kind and its speed, and the keys of that."""
+def _participant(scenario: LogicalScenario, item: Participant) -> str:
+    """Return what may be said for a participant: its kind and its speed."""
     words = []
     for word, kind in vocabulary()["kinds"].items():
         if item.type_by or item.own_body or item.model or item.siren:
@@ -296,12 +298,9 @@ def _participant(
             of = MODELS[kind].type if kind in MODELS else kind or "car"
             fits = PARTICIPANTS[of].seen_as.conduct == item.conduct
         words += [word] * fits
-    text = f"(?P<{item.name}>{'|'.join(words) or '(?!)'})"
-    slots = {item.name: (f"participants.{item.name}", "kind")}
-    if (parameter := scenario.parameters.get(str(item.speed))) is not None:
-        text += f"(?: (?:at|doing) (?P<{item.name}_speed>{_quantity(parameter.unit)}))?"
-        slots[f"{item.name}_speed"] = (f"parameters.{parameter.name}", parameter.unit)
-    return text, slots
+    text = f"(?P<kind__{item.name}>{'|'.join(words) or '(?!)'})"
+    speed = scenario.parameters.get(str(item.speed))
+    return text if speed is None else f"{text}(?: (?:at|doing) {_quantity(speed, item.name)})?"
 
 
 def _symbols(unit: str) -> dict[str, str]:
@@ -311,11 +310,12 @@ def _symbols(unit: str) -> dict[str, str]:
     return {word: symbol for symbol in symbols for word in (symbol, *spoken.get(symbol, ()))}
 
 
-def _quantity(unit: str) -> str:
-    symbols = sorted(map(re.escape, _symbols(unit)), key=len, reverse=True)
+def _quantity(parameter: Parameter, of: str = "") -> str:
+    symbols = sorted(map(re.escape, _symbols(parameter.unit)), key=len, reverse=True)
     one = _NUMBER + (f" (?:{'|'.join(symbols)})" if symbols else "")
     first = rf"(?:{one}|{_NUMBER})"
-    return f"(?:{_LEAST}|{_MOST}) {one}|between {first} {one}|{first} (?:to|-) {one}|{one}"
+    form = f"(?:{_LEAST}|{_MOST}) {one}|between {first} {one}|{first} (?:to|-) {one}|{one}"
+    return f"(?P<value{of}__{parameter.name}>{form})"
 
 
 def _range(text: str, unit: str) -> Range:
@@ -357,27 +357,17 @@ def _readings(matches: Sequence[_Match], count: int, *, needs_event: bool) -> li
     return found if needs_event or not count else found or best.get((count, False), [])
 
 
-def _once(scenario: LogicalScenario, reading: Sequence[_Match]) -> dict[str, Given]:
-    """Return what is given by key; refuse two values of one, and what a parameter cannot have.
+def _once(reading: _Reading) -> dict[str, Given]:
+    """Return what is given by key.
 
     Raises:
-        InputError: all that are.
+        InputError: a key is given two values.
     """
     given: dict[str, Given] = {}
-    problems = []
     for item in (item for match in reading for item in match.given):
         first = given.setdefault(item.key, item)
         if first.value != item.value:
-            problems.append(f"{item.key} is said twice: '{first.said}', '{item.said}'")
-        elif first.said != item.said:
+            raise InputError(f"{item.key} is said twice: '{first.said}', '{item.said}'")
+        if first.said != item.said:
             given[item.key] = first._replace(said=f"{first.said}; {item.said}")
-        if isinstance(item.value, Range):
-            parameter = scenario.parameters[item.key.removeprefix("parameters.")]
-            if item.value.within(parameter.low, parameter.high) is None:
-                problems.append(
-                    f"{parameter.name} [{parameter.unit}] of {scenario.name} is {parameter.low:g} "
-                    f"to {parameter.high:g}, got '{item.said}'"
-                )
-    if problems:
-        raise InputError(*problems)
     return given

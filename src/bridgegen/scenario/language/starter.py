@@ -17,26 +17,37 @@ from bridgegen.scenario.language.sentence import read_sentence
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
-def start_scenario(name: str, *, like: str | None = None, folder: Path | None = None) -> Path:
+def start_scenario(
+    name: str, *, like: str | None = None, says: str | None = None, folder: Path | None = None
+) -> Path:
     """Write ``NAME.yaml``, a valid scenario that its reader can make their own, and its schema.
 
     Args:
         name: of the scenario and its file.
         like: a scenario of the catalogue or of a pack to copy; by default a small one that
             explains itself.
+        says: a sentence, of which the scenario is made (of the catalogue's ``like``, or of the one
+            that it says); what was understood stands at the head of the file.
         folder: where to; by default here.
 
     Returns:
         The file.
 
     Raises:
-        InputError: the name is no word.
+        InputError: the name is no word, or the sentence is not understood or not possible.
         UnknownNameError: no such scenario.
         StorageError: there is such a file already, or what is called like the schema and is none,
             or it cannot be written.
     """
-    _refuse_name(name)
-    if like is None:
+    if not _WORD.fullmatch(name):
+        raise InputError(
+            f"a scenario's name is a word of letters, digits, '_' and '-', 64 at most, got '{name}'"
+        )
+    if name in names():
+        raise InputError(f"'{name}' ships with BridgeGen; choose another name")
+    if says is not None:
+        text = narrow(read_sentence(says, like), name)
+    elif like is None:
         text = (
             resources.files("bridgegen.scenario.language")
             .joinpath("starter.yaml")
@@ -48,42 +59,6 @@ def start_scenario(name: str, *, like: str | None = None, folder: Path | None = 
         text = re.sub(r"^scenario: .*$", f"scenario: {name}", text, count=1, flags=re.M)
     else:
         raise UnknownNameError("scenario", like, known)
-    return _write(name, text, folder)
-
-
-def start_from_sentence(
-    name: str, sentence: str, *, like: str | None = None, folder: Path | None = None
-) -> tuple[Path, tuple[str, ...]]:
-    """Write ``NAME.yaml``, the scenario of the catalogue that a sentence says, and its schema.
-
-    Args:
-        name: as of `start_scenario`.
-        sentence: see `bridgegen.scenario.language.sentence`.
-        like: the scenario of the catalogue that it is about; by default it says so itself.
-        folder: as of `start_scenario`.
-
-    Returns:
-        The file, and what was understood, see `bridgegen.scenario.language.narrowed.narrow`.
-
-    Raises:
-        InputError: the name is no word; or the sentence is not understood, or not possible.
-        StorageError: as of `start_scenario`.
-    """
-    _refuse_name(name)
-    text, lines = narrow(read_sentence(sentence, like), name)
-    return _write(name, text, folder), lines
-
-
-def _refuse_name(name: str) -> None:
-    if not _WORD.fullmatch(name):
-        raise InputError(
-            f"a scenario's name is a word of letters, digits, '_' and '-', 64 at most, got '{name}'"
-        )
-    if name in names():
-        raise InputError(f"'{name}' ships with BridgeGen; choose another name")
-
-
-def _write(name: str, text: str, folder: Path | None) -> Path:
     path = (folder or Path()) / f"{name}.yaml"
     refuse_other_schema(path.with_name(FILE))
     text = f"# yaml-language-server: $schema={FILE}\n{text}"
