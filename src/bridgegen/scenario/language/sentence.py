@@ -314,7 +314,7 @@ def _quantity(parameter: Parameter, of: str = "") -> str:
     symbols = sorted(map(re.escape, _symbols(parameter.unit)), key=len, reverse=True)
     one = _NUMBER + (f" (?:{'|'.join(symbols)})" if symbols else "")
     first = rf"(?:{one}|{_NUMBER})"
-    form = f"(?:{_LEAST}|{_MOST}) {one}|between {first} {one}|{first} (?:to|-) {one}|{one}"
+    form = f"(?:{_LEAST}|{_MOST}) {one}|between {first} {one}|(?:from )?{first} (?:to|-) {one}|{one}"
     return f"(?P<value{of}__{parameter.name}>{form})"
 
 
