@@ -269,7 +269,8 @@ def new(
 
     path = start_scenario(name, like=like, says=says)
     if says is not None:
-        head = takewhile(lambda line: line.startswith("# "), path.read_text("utf-8").splitlines())
+        _, *lines = path.read_text("utf-8").splitlines()  # the first one is for editors
+        head = takewhile(lambda line: line.startswith("# "), lines)
         print(*(line.removeprefix("# ") for line in head), sep="\n")
     print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
 

@@ -166,7 +166,7 @@ def _lines(sentence: Sentence, limits: _Limits) -> list[str]:
     scenario = sentence.scenario
     rows: dict[str, tuple[object, str]] = {"like": (scenario.name, "")}
     rows |= {key: (value, f'"{said}"') for key, value, said in sentence.given.values()}
-    rows["like"] = (scenario.name, f"{rows['like'][1]} {scenario.title}".lstrip())
+    rows["like"] = (scenario.name, f"{rows['like'][1]}: {scenario.title}".lstrip(": "))
     for name, (low, high, words) in limits.items():
         item = scenario.parameters[name]
         if not item.kind.names:
