@@ -6,7 +6,8 @@ said, too.
 """
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -39,18 +40,20 @@ def narrow(sentence: Sentence, name: str) -> str:
     Raises:
         InputError: the scenario cannot be like that; says which of its rules is in the way.
     """
-    scenario, limits, reasons = sentence.scenario, _of_bodies(sentence), list[str]()
-    # One after the other: what each makes necessary is found apart.
-    data, limits = _narrowed(sentence, name, limits, reasons)
-    for key, value, said in sentence.given.values():
-        item = scenario.parameters.get(key.removeprefix("parameters."))
-        if item is None:
-            continue
-        low, high, words = limits.get(item.name, (item.low, item.high, ""))
-        ends = (item.read(value),) * 2 if isinstance(value, str) else value.within(item)
-        words = f'"{said}"' + (f"; {words}" if words else "")
-        limits[item.name] = (max(low, ends[0]), min(high, ends[1]), words)
-        data, limits = _narrowed(sentence, name, limits, reasons)
+    parameters, caps, reasons = sentence.scenario.parameters, _of_bodies(sentence), list[str]()
+    said: _Limits = {}
+    for key, value, text in sentence.given.values():
+        if (item := parameters.get(key.removeprefix("parameters."))) is not None:
+            low, high, words = caps.get(item.name, (item.low, item.high, ""))
+            ends = (item.read(value),) * 2 if isinstance(value, str) else value.within(item)
+            words = f'"{text}"' + (f"; {words}" if words else "")
+            said[item.name] = (max(low, ends[0]), min(high, ends[1]), words)
+    try:
+        data, limits = _narrowed(sentence, name, caps | said, reasons)
+    except InputError:  # more than one thing may be in the way: each is narrowed for apart
+        data, limits = _narrowed(sentence, name, caps, reasons)
+        for key, limit in said.items():
+            data, limits = _narrowed(sentence, name, limits | {key: limit}, reasons)
     lines = [*_lines(sentence, limits), *(f"# {_NARROWED}, else: {text}" for text in reasons)]
     text = "".join(f"# {line}\n" for line in lines)
     text += yaml.dump(
@@ -93,21 +96,40 @@ def _narrowed(
         return _file(sentence, name, limits), limits
     except InputError as error:
         problem = " ".join(error.problems[0].split())
-    for share in _SHARES:
-        for item in sentence.scenario.parameters.values():
-            low, high, words = limits.get(item.name, (item.low, item.high, ""))
-            if item.kind.name != "float" or low == high or words.startswith('"'):
-                continue
-            part = float(f"{share * (high - low):.2g}")
-            for ends in ((low, low + part), (high - part, high)):
-                more = {**limits, item.name: (*ends, _NARROWED)}
-                try:
-                    data = _file(sentence, name, more)
-                except InputError:
-                    continue
-                reasons.append(problem)
-                return data, more
+    for ends in _fewer(sentence, limits):
+        more = {key: (*pair, _NARROWED) for key, pair in ends.items()}
+        try:
+            data = _file(sentence, name, limits | more)
+        except InputError:
+            continue
+        for key in ends if len(ends) > 1 else ():  # not all of them may be in the way
+            fewer = {other: limit for other, limit in more.items() if other != key}
+            with suppress(InputError):
+                data, more = _file(sentence, name, limits | fewer), fewer
+        reasons.append(problem)
+        return data, limits | more
     raise InputError(f"{sentence.scenario.name} cannot be as '{sentence.text}' says: {problem}")
+
+
+def _fewer(sentence: Sentence, limits: _Limits) -> Iterator[dict[str, tuple[float, float]]]:
+    """Yield ranges of what is not said: one from one end, or the weather near its defaults."""
+    free = [
+        (item, *limits.get(item.name, (item.low, item.high))[:2])
+        for item in sentence.scenario.parameters.values()
+        if item.kind.name == "float" and f"parameters.{item.name}" not in sentence.given
+    ]
+    for share in _SHARES:
+        for item, low, high in free:
+            part = float(f"{share * (high - low):.2g}")
+            yield {item.name: (low, low + part)}
+            yield {item.name: (high - part, high)}
+    weather = [each for each in free if each[0].axis is Axis.WEATHER]
+    for share in (*_SHARES, 0.0):
+        yield {
+            item.name: (usual - share * (usual - low), usual + share * (high - usual))
+            for item, low, high in weather
+            for usual in (item.default,)
+        }
 
 
 def _file(sentence: Sentence, name: str, limits: _Limits) -> Any:

@@ -11,7 +11,7 @@ from importlib import resources
 from typing import Any, NamedTuple
 
 from bridgegen.base.errors import InputError, UnknownNameError
-from bridgegen.base.units import WRITTEN, in_unit
+from bridgegen.base.units import in_unit
 from bridgegen.scenario.language.parameters import Parameter
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 from bridgegen.scenario.language.reader import load, names
@@ -265,6 +265,7 @@ def _patterns(scenario: LogicalScenario) -> Iterator[_Pattern]:
         for text, (low, high) in known["weather"].get(name, {}).items():
             yield pattern(text, ((f"parameters.{name}", Range(low, high)),))
     for item in scenario.participants:
+        yield pattern(f"{item.name.replace('_', ' ')} {{{item.name}}}")
         if item.speed in scenario.parameters:
             spoken = "EGO" if item.name == "ego" else f"{{{item.name}}}"
             yield pattern(f"{spoken}( DRIVES)?( at)? {{}}", (), str(item.speed))
@@ -303,24 +304,21 @@ def _participant(scenario: LogicalScenario, item: Participant) -> str:
     return text if speed is None else f"{text}(?: (?:at|doing) {_quantity(speed, item.name)})?"
 
 
-def _symbols(unit: str) -> dict[str, str]:
-    """Return how a unit is said: the words, and the symbol that they stand for."""
-    spoken = vocabulary()["units"]
-    symbols = [symbol for symbol in WRITTEN.get(unit, {}) if symbol.islower() or symbol == "%"]
-    return {word: symbol for symbol in symbols for word in (symbol, *spoken.get(symbol, ()))}
-
-
 def _quantity(parameter: Parameter, of: str = "") -> str:
-    symbols = sorted(map(re.escape, _symbols(parameter.unit)), key=len, reverse=True)
+    symbols = sorted(
+        map(re.escape, vocabulary()["units"].get(parameter.unit, ())), key=len, reverse=True
+    )
     one = _NUMBER + (f" (?:{'|'.join(symbols)})" if symbols else "")
     first = rf"(?:{one}|{_NUMBER})"
-    form = f"(?:{_LEAST}|{_MOST}) {one}|between {first} {one}|(?:from )?{first} (?:to|-) {one}|{one}"
+    form = (
+        f"(?:{_LEAST}|{_MOST}) {one}|between {first} {one}|(?:from )?{first} (?:to|-) {one}|{one}"
+    )
     return f"(?P<value{of}__{parameter.name}>{form})"
 
 
 def _range(text: str, unit: str) -> Range:
     """Return the values that a quantity's words give, in a unit."""
-    symbols = _symbols(unit)
+    symbols = vocabulary()["units"].get(unit, {})
     ends = re.findall(rf"({_NUMBER})((?: (?!to\b|-)[^\s\d+-]\S*)*)", text)
     last = symbols.get(ends[-1][1].strip(), "")
     said = [(number, symbols.get(words.strip(), last)) for number, words in ends]
