@@ -4,12 +4,18 @@ import pytest
 from tests.approval import approve, refuses
 
 from bridgegen.base.errors import UnsupportedError
+from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.lane_graph import LaneGraph
+from bridgegen.openx.opendrive.map_names import lane_name
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.routes import plan_route
+from bridgegen.openx.opendrive.site import turned_sites
 from bridgegen.openx.opendrive.to_owl.network import individuals_from_opendrive
 from bridgegen.openx.opendrive.validate import problems
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import local_name
 
 WIDTH = '<width sOffset="0" a="4" b="0" c="0" d="0"/>'
 
@@ -95,9 +101,31 @@ def test_links_that_lead_nowhere_are_left_out(wrong: dict[str, str], said: str):
     assert any(said in warning for warning in warnings)
 
 
-def test_the_ontology_has_no_words_for_it():
-    with refuses(UnsupportedError):
-        individuals_from_opendrive(read(document(), "exit.xodr"), "exit.xodr")
+def test_the_ontology_has_it_with_its_lanes():
+    model = read(document(), "exit.xodr")
+    found = individuals_from_opendrive(model, "exit.xodr")
+    (junction,) = found.of_class("DirectJunction")
+    assert len(found.links(junction, "has_leg")) == 3
+    assert not found.links(junction, "has_inner_road")
+    lanes = {
+        tuple(local_name(found.link(link, name)) for name in ("from_lane", "to_lane"))
+        for connection in found.links(junction, "has_connection")
+        for link in found.links(connection, "has_lane_link")
+    }
+    names = [lane_name("1", 0, -1), lane_name("2", 0, -1), lane_name("3", 0, -1)]
+    assert {(names[0], names[1]), (lane_name("1", 0, -2), names[2])} <= lanes
+    assert len(lanes) == 3
+    assert check(found) == []
+    unnamed = [quad for quad in found.quads if local_name(quad.predicate) != "has_map_file"]
+    with refuses(UnsupportedError, "direct junction"):  # there is no file of the map any more
+        opendrive_from_owl(Individuals(unnamed))
+
+
+def test_a_place_of_the_map_says_what_it_is():
+    headings = {"A": 180.0, "B": 0.0, "C": 0.0}
+    assert {site.kind for site in turned_sites(read(document()), None, None, headings)} == {
+        "DirectJunction"
+    }
 
 
 def test_virtual_junctions_are_refused_by_name():

@@ -324,6 +324,9 @@ BOXES = NEAR.replace('freespace="false"', 'freespace="true" coordinateSystem="la
          "OpenScenarioCondition"),
         (SETS_OFF, '<TeleportAction><Position><RelativeObjectPosition entityRef="Hero" dx="40" '
          'dy="3"/></Position></TeleportAction>', "OpenScenarioPosition"),
+        (SETS_OFF, '<LongitudinalAction><LongitudinalDistanceAction entityRef="Hero" distance="-9" '
+         'freespace="true" continuous="true" coordinateSystem="lane" displacement='
+         '"trailingReferencedEntity"/></LongitudinalAction>', "OpenScenarioAction"),
     ],
 )  # fmt: skip
 def test_what_has_no_words_is_kept_in_those_of_openscenario(plain, folder, old, new, cls):

@@ -221,6 +221,8 @@ def test_attentive_drivers_do_not_mind_who_is_hidden_from_traffic():
 LATER = start("cv", lane(3, 2, 50.0), 0.0)
 """bv has no place at the start."""
 
+NOWHERE = f"""<Private entityRef="bv"><PrivateAction>{speed(5.0)}</PrivateAction></Private>"""
+
 
 def test_who_has_no_place_at_the_start_is_there_once_it_is_added():
     """At 2 s, 60 m from the junction; it goes at once, with the speed that the start gives it."""
@@ -312,7 +314,7 @@ def test_who_comes_back_may_count_from_where_it_went():
 
 def test_who_is_never_there_is_a_mistake():
     with refuses(InputError, "bv", "TeleportAction"):
-        scene(privates=LATER)
+        scene(privates=NOWHERE + LATER)
     come = ("come", (add("ego", lane(3, 1, 60.0)),), after(2.0))
     text = scenario(("ego", "cv"), LATER, act(come))
     with refuses(InputError, "ego"):

@@ -142,9 +142,7 @@ def test_events_tell_when_they_began():
 @pytest.mark.parametrize(
     ("privates", "events", "text"),
     [
-        (timed("bv", vertex(0, 0.0, 0.0), vertex(None, 1.0, 0.0)), "", "Vertex"),
         (timed("bv", vertex(1, 0.0, 0.0), vertex(1, 1.0, 0.0)), "", "1 s"),
-        (timed("bv", *LINE, more=' initialDistanceOffset="3"'), "", 'initialDistanceOffset="3'),
     ],
 )  # fmt: skip
 def test_refusals(privates, events, text):

@@ -70,7 +70,8 @@ def turned_sites(
     junction = model.junction(junction_id or _default_junction(model, stem, len(headings)))
     ends = list(road_ends(model, junction))
     what = f"junction {junction.id} of {stem}"
-    kind = _KINDS.get(len(ends), "Intersection")
+    direct = "DirectJunction" if junction.is_direct else None
+    kind = direct or _KINDS.get(len(ends), "Intersection")
     site = Site(stem, map_name, junction.id, None, (), kind=kind)
     return _turned(model, site, ends, headings, what)
 

@@ -79,7 +79,7 @@ class TimeOfDayCondition(Element):
 class SimulationTimeCondition(Element):
     """Compares the time since the scenario's start [s]."""
 
-    value: Annotated[Double, Range(0.0)]
+    value: Double
     rule: Rule | ParameterRef
 
 

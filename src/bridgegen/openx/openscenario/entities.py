@@ -26,7 +26,7 @@ from bridgegen.openx.openscenario.enumerations import (
 from bridgegen.openx.openscenario.values import Boolean, Double, Int, ParameterRef, String
 
 _NOT_NEGATIVE = Range(0.0)
-_EXTENT = Range(0.0, FINITE, above=True)  # a box without an area has no distance to others
+_EXTENT = Range(0.0, FINITE)
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Dimensions(Element):
 
     width: Annotated[Double, _EXTENT]
     length: Annotated[Double, _EXTENT]
-    height: Annotated[Double, Range(0.0, FINITE)]
+    height: Annotated[Double, _EXTENT]
 
 
 @dataclass(frozen=True)

@@ -101,13 +101,14 @@ class LongitudinalDistanceAction(Element):
     """Keeping a distance [m] or a time gap [s] to another entity.
 
     In 1.0 the entity stays behind the other one; from 1.1 on ``displacement`` says on which side.
+    Other tools write a number below 0, which the standard does not have; only its size counts.
     """
 
     entity_ref: Annotated[String, ENTITY]
     continuous: Boolean
     freespace: Boolean
-    distance: Annotated[Double | None, _NOT_NEGATIVE] = None
-    time_gap: Annotated[Double | None, _NOT_NEGATIVE] = None
+    distance: FiniteDouble | None = None
+    time_gap: FiniteDouble | None = None
     displacement: LongitudinalDisplacement | ParameterRef | None = None
     coordinate_system: CoordinateSystem | ParameterRef | None = None
     dynamic_constraints: DynamicConstraints | None = None

@@ -18,6 +18,16 @@ ValueOf = Callable[[Any], Any]
 PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 """The storyboard's parts, by their tags."""
 
+NAMED = frozenset(
+    {
+        *PARTS,
+        *("ScenarioObject", "EntitySelection", "ObjectController"),
+        *("VariableDeclaration", "MonitorDeclaration"),
+        *("TrafficSignalController", "Phase"),
+    }
+)
+"""The tags of all that a file may refer to by its name, besides parameters."""
+
 _TAGS = {osc.StoryboardElementType(tag[0].lower() + tag[1:]): tag for tag in PARTS}
 
 
@@ -28,6 +38,17 @@ def to_storyboard(scenario: osc.OpenScenario, value_of: ValueOf) -> set[str]:
         for node in walk(scenario)
         if isinstance(node, osc.StoryboardElementStateCondition)
         for part in str(value_of(node.storyboard_element_ref)).split("::")
+    }
+
+
+def to_phases(scenario: osc.OpenScenario, value_of: ValueOf) -> set[str]:
+    """Return the names of the phases of traffic lights that are referred to."""
+    return {
+        str(value_of(node.phase))
+        for node in walk(scenario)
+        if isinstance(
+            node, osc.TrafficSignalControllerAction | osc.TrafficSignalControllerCondition
+        )
     }
 
 

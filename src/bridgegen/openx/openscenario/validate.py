@@ -73,19 +73,21 @@ class _Check:
         return self.values[value.name] if isinstance(value, osc.ParameterRef) else value
 
     def names(self) -> Iterator[Problem]:
-        """Yield names that two elements of one kind beside each other share.
+        """Yield names that two elements of one kind beside each other share, if they are needed.
 
-        Of the storyboard's parts only those that are referred to must have a name of their own.
+        Those are the names by which a file may refer to something; of the storyboard's parts, and
+        of the phases of lights, only those by which it does.
         """
-        referred = references.to_storyboard(self.scenario, self.value)
+        parts = dict.fromkeys(references.PARTS, references.to_storyboard(self.scenario, self.value))
+        needed = parts | {"Phase": references.to_phases(self.scenario, self.value)}
         for element in walk(self.scenario):
             seen: set[tuple[str, Any]] = set()
             for tag, child in children_of(element):
                 name = getattr(child, "name", None)
-                if name is None or tag == "Property":
+                if name is None or tag not in references.NAMED:
                     continue
                 name = self.value(name)
-                if tag in references.PARTS and name not in referred:
+                if tag in needed and name not in needed[tag]:
                     continue
                 if (tag, name) in seen:
                     yield child.line, f"the name of a {tag} must be its own, got '{name}' twice"

@@ -71,6 +71,9 @@ def _made(individuals: Individuals, network: Subject) -> OpenDrive:
             f"a road network is made with one intersection in this version, got {len(crossings)}"
         )
     (crossing,) = crossings
+    if individuals.is_a(crossing, "DirectJunction"):
+        what = f"{individuals.describe(crossing)}: a direct junction"
+        raise UnsupportedError(f"{what} is read from maps, but not made in this version")
     problems: list[str] = []
     junction_id = read_id(individuals, crossing, "has_junction_id", problems)
     arms: list[Arm] = []

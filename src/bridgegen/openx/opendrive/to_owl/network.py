@@ -11,7 +11,6 @@ from pathlib import PurePath
 
 import pyoxigraph as ox
 
-from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.opendrive.from_owl.network import KINDS, MEASURES
 from bridgegen.openx.opendrive.geometry import pose
 from bridgegen.openx.opendrive.lanes import section_end, width_of
@@ -64,9 +63,6 @@ class Junctions:
                 self._add(junction)
 
     def _add(self, junction: Junction) -> None:
-        if junction.is_direct:
-            what = f"junction {junction.id}: a direct junction"
-            raise UnsupportedError(f"{what} cannot be said in the ontology")
         put = self._builder.put
         parts = [
             item
@@ -86,6 +82,8 @@ class Junctions:
         if not legs:
             return  # no road leads there
         kind = self.kinds.get(junction.id) or _BY_LEGS.get(len(legs), "Intersection")
+        if junction.is_direct:
+            kind = "DirectJunction"
         node = self._builder.node(junction_name(junction.id), kind)
         put(self._network, "has_area", node)
         put(node, "has_junction_id", junction.id)

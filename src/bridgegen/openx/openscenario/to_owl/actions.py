@@ -185,6 +185,9 @@ def _keep_distance(
     unsaid = (limits.max_acceleration_rate, limits.max_deceleration_rate)
     if any(value is not None for value in unsaid):
         raise NotExpressibleError(limits, f"DynamicConstraints of {what} besides accelerations")
+    kept = action.time_gap if action.distance is None else action.distance
+    if kept is not None and builder.now(kept, action) < 0.0:
+        raise NotExpressibleError(action, f"{what} with a number below 0")
     side, axes = action.displacement, action.coordinate_system
     behind = osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY
     if side is not None and builder.text(side) != behind:

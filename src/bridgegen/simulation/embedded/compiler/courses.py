@@ -4,7 +4,7 @@ import math
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.openx.openscenario.values import Value
+from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
@@ -164,8 +164,28 @@ class Courses:
             side = self._tables.choice(osc.LongitudinalDisplacement, action.displacement)
         row[codes.SIDE] = _SIDES[side]
         self._keep_off(row, action)
-        slot = self._tables.slot(given[0] if given else 0.0)
+        value: Value = given[0] if given else 0.0
+        if self._tables.declared(value) < 0.0:
+            value = self._size(action, value, row)
+        slot = self._tables.slot(value)
         return entity, codes.KEEP_DISTANCE, 0, 0, slot, slot, self._keep(row)
+
+    def _size(self, action: osc.LongitudinalDistanceAction, value: Value, row: list[int]) -> Value:
+        """Return a number below 0 without its sign, which the standard does not have; note it.
+
+        The displacement says on which side. 1.0 has none: there the sign does, as for esmini.
+        """
+        if action.displacement is None and self._positions.minor == 0:
+            row[codes.SIDE] = codes.AHEAD
+        side = {codes.BEHIND: "behind", codes.AHEAD: "ahead of"}
+        where = side.get(row[codes.SIDE], "on its present side of")
+        unit, now = "m" if action.time_gap is None else "s", self._tables.declared(value)
+        said = f"{now:g} {unit}, below 0, is read as {-now:g} {unit} {where} '{action.entity_ref}'"
+        self._tables.note(action, said)
+        if isinstance(value, osc.ParameterRef | Expr):
+            inner = value.text[2:-1] if isinstance(value, Expr) else value.text
+            return Expr(f"${{abs({inner})}}")
+        return -now
 
     def _lateral_distance(self, action: osc.LateralDistanceAction, entity: int) -> Row:
         row = self._row(entity, action.entity_ref)

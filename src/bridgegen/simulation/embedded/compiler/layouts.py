@@ -25,7 +25,7 @@ from bridgegen.simulation.embedded._codes import LAYOUT_WIDTH, RIGID, THROUGH, W
 from bridgegen.simulation.embedded.compiler.curves import basis, bends, sampled
 from bridgegen.simulation.embedded.compiler.positions import Positions, is_fixed
 from bridgegen.simulation.embedded.compiler.tables import TRAILERS, Tables, table
-from bridgegen.simulation.embedded.compiler.trajectories import check_times
+from bridgegen.simulation.embedded.compiler.trajectories import check_times, filled, usable_times
 
 UNTIMED = -1
 SAMPLE = 1.0  # m, between the vertices of a clothoid that is laid: 1 mm off in a bend of 125 m
@@ -124,14 +124,19 @@ class Layouts:
             self._tables.unsupported(trajectory, 'a Trajectory with closed="true"')
         line, stated = trajectory.shape.shape, action.time_reference.reference
         timing = stated if isinstance(stated, osc.Timing) else None
-        if timing is not None and not _has_times(line):
+        times: tuple[float, ...] = ()
+        if isinstance(line, osc.Clothoid | osc.ClothoidSpline):
+            if timing is not None:
+                times = usable_times(self._tables, line, bends(self._tables, line)[2])
+                timing = timing if times else None
+        elif timing is not None and not _has_times(line):
             self._tables.note(line, "it states no times: followed at the entity's own speed")
             timing = None
         start = action.initial_distance_offset
         if timing is not None and start not in (None, 0.0):
-            what = f'initialDistanceOffset="{start}" in a trajectory with times'
+            what = f'initialDistanceOffset="{start}" in a trajectory with times that is laid'
             self._tables.unsupported(action, what)
-        return self._append(self._drawn(line, timing, entity), timing)
+        return self._append(self._drawn(line, timing, entity, times), timing)
 
     def add_line(self, where: osc.TrajectoryPosition) -> int:
         """Return the number of the trajectory along which a position is; it is not followed."""
@@ -171,12 +176,13 @@ class Layouts:
         line: osc.Polyline | osc.Clothoid | osc.ClothoidSpline | osc.Nurbs,
         timing: osc.Timing | None,
         entity: int,
+        times: Sequence[float] = (),
     ) -> "_Drawn":
         if isinstance(line, osc.Polyline):
             return self._through(line, timing)
         if isinstance(line, osc.Nurbs):
             return self._weighted(line, timing)
-        return self._rigid(line, timing, entity)
+        return self._rigid(line, times, entity)
 
     def _through(self, line: osc.Polyline, timing: osc.Timing | None) -> "_Drawn":
         """Return the vertices of straight lines."""
@@ -185,8 +191,12 @@ class Layouts:
             self._tables.unsupported(line, what)
             return _Drawn(THROUGH, [])
         stated = [vertex.time for vertex in line.vertices]
+        for vertex in line.vertices if timing is not None else ():
+            if vertex.time is None:  # where it is, and so how far, is known when it begins
+                what = "a Vertex without a time in a trajectory with times that depends on the row"
+                self._tables.unsupported(vertex, what)
         if timing is not None and all(map(_is_literal, (*stated, timing.scale, timing.offset))):
-            known = [None if time is None else self._tables.declared(time) for time in stated]
+            known = [math.nan if time is None else self._tables.declared(time) for time in stated]
             check_times(self._tables, timing, known, line.vertices)
         anchors = [
             (
@@ -199,10 +209,10 @@ class Layouts:
         return _Drawn(THROUGH, anchors)
 
     def _rigid(
-        self, line: osc.Clothoid | osc.ClothoidSpline, timing: osc.Timing | None, entity: int
+        self, line: osc.Clothoid | osc.ClothoidSpline, times: Sequence[float], entity: int
     ) -> "_Drawn":
         """Return bends from a start, the entity's own place where they state none."""
-        origin, curve, ends = bends(self._tables, line)
+        origin, curve, _ = bends(self._tables, line)
         place = self._positions.add_own(entity) if origin is None else self._positions.add(origin)
         anchors = [(place, UNTIMED, 1)]
         if isinstance(line, osc.ClothoidSpline):
@@ -213,11 +223,12 @@ class Layouts:
         if not 0.0 < length <= SAMPLE * (MOST_VERTICES - 1):
             self._tables.unsupported(line, f"a clothoid {length:g} m long")
             return drawn
-        known = [time for time in ends if time is not None]
-        if timing is not None and len(known) < len(ends):
-            self._tables.unsupported(line, "a clothoid with some of its times")
-            return drawn
         knots = np.cumsum([0.0, *(bend.length for bend in curve)])
+        try:
+            known = filled(times, knots) if times else []
+        except InputError as error:
+            self._tables.unsupported(line, str(error))
+            return drawn
         begins = [0, *(k for k, bend in enumerate(curve) if bend.starts), len(curve)]
         parts: list[Float] = []
         for number, (first, past) in enumerate(pairwise(begins)):
@@ -226,11 +237,11 @@ class Layouts:
             except InputError as error:
                 self._tables.unsupported(line, str(error))
                 return drawn
-            times = np.zeros(len(samples))
-            if timing is not None:
-                times = np.interp(knots[first] + np.arange(len(samples)) * step, knots, known)
-            part = np.column_stack((samples[:, :3], times, np.full(len(samples), float(number))))
-            if timing is not None and past < len(curve):
+            clock = np.zeros(len(samples))
+            if times:
+                clock = np.interp(knots[first] + np.arange(len(samples)) * step, knots, known)
+            part = np.column_stack((samples[:, :3], clock, np.full(len(samples), float(number))))
+            if times and past < len(curve):
                 part = part[:-1]  # the next one starts then
             parts.append(part)
         return replace(drawn, shape=np.concatenate(parts))
@@ -266,18 +277,10 @@ class Layouts:
         return _Drawn(WEIGHTED, anchors, shares)
 
 
-def _has_times(line: osc.Polyline | osc.Clothoid | osc.ClothoidSpline | osc.Nurbs) -> bool:
+def _has_times(line: osc.Polyline | osc.Nurbs) -> bool:
     """Return whether a line states any time."""
-    times: list[Value | None]
-    if isinstance(line, osc.Polyline):
-        times = [vertex.time for vertex in line.vertices]
-    elif isinstance(line, osc.Nurbs):
-        times = [point.time for point in line.control_points]
-    elif isinstance(line, osc.Clothoid):
-        times = [line.start_time, line.stop_time]
-    else:
-        times = [line.time_end, *(segment.time_start for segment in line.segments)]
-    return any(time is not None for time in times)
+    points = line.vertices if isinstance(line, osc.Polyline) else line.control_points
+    return any(point.time is not None for point in points)
 
 
 def _knot_problem(
@@ -322,6 +325,13 @@ Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.ExternalObjectReferen
 
 _STEEPEST = 1.5  # rad, a steering angle that is as good as a right angle
 
+THINNEST = 0.001
+"""The least length and width of a body [m]: files may state 0."""
+
+WHEELBASE_SHARE = 0.61
+"""Distance between the axles by a vehicle's length [1], where they state none: as that of the cars
+in `bridgegen.scenario.named_models`."""
+
 
 def kind(body: Body) -> int:
     """Return what an entity is, see `bridgegen.drivers.kinds`."""
@@ -358,10 +368,26 @@ def limits_of(body: Body, place: str) -> Float:
 
 
 def wheelbase(tables: Tables, body: osc.Vehicle) -> float:
-    """Return the distance between the axles [m]; 0 of a vehicle with one axle."""
+    """Return the distance between the axles [m]; 0 of a trailer with one axle.
+
+    Of another vehicle that states none, the usual share of its length.
+    """
+    found = _apart(tables, body)
+    if found > 0.0 or body.vehicle_category in TRAILERS:
+        return found
+    return WHEELBASE_SHARE * _extent(tables, body.bounding_box.dimensions, "length")
+
+
+def _apart(tables: Tables, body: osc.Vehicle) -> float:
+    """Return how far the front axle is ahead of the rear one as it is stated [m]."""
     rear, front = body.axles.rear, body.axles.front or body.axles.rear
     ahead = tables.literal(front, "positionX", front.position_x)
     return ahead - tables.literal(rear, "positionX", rear.position_x)
+
+
+def _extent(tables: Tables, size: osc.Dimensions, name: str) -> float:
+    """Return the length or the width of a box [m]; not 0, which has no distance to others."""
+    return max(tables.literal(size, name, getattr(size, name)), THINNEST)
 
 
 def measures(tables: Tables, body: Body) -> tuple[float, ...]:
@@ -372,8 +398,8 @@ def measures(tables: Tables, body: Body) -> tuple[float, ...]:
     box = body.bounding_box
     height = tables.literal(box.dimensions, "height", box.dimensions.height)
     size = (
-        tables.literal(box.dimensions, "length", box.dimensions.length),
-        tables.literal(box.dimensions, "width", box.dimensions.width),
+        _extent(tables, box.dimensions, "length"),
+        _extent(tables, box.dimensions, "width"),
         tables.literal(box.center, "x", box.center.x),
     )
     if not isinstance(body, osc.Vehicle):
@@ -384,8 +410,8 @@ def measures(tables: Tables, body: Body) -> tuple[float, ...]:
     bend = elementary.tan(min(lock, _STEEPEST)) / max(distance, 0.1)
     if distance <= 0.0 and body.vehicle_category in TRAILERS:
         bend = math.inf  # it has nothing to steer with, and goes where it is led
-    elif distance <= 0.0:
-        tables.unsupported(axles, "a Vehicle without a FrontAxle ahead of its RearAxle")
+    elif _apart(tables, body) <= 0.0:
+        tables.note(axles, f"no FrontAxle ahead of the RearAxle: taken as {distance:g} m ahead")
     return (
         *size,
         tables.literal(limits, "maxSpeed", limits.max_speed),

@@ -68,7 +68,7 @@ class Positions:
     """
 
     def __init__(self, tables: Tables, minor_version: int) -> None:
-        self._tables, self._minor = tables, minor_version
+        self._tables, self.minor = tables, minor_version
         self.rows: list[tuple[int, ...]] = []
         self.spots: list[Spot | None] = []
         self.points: list[Point] = []
@@ -190,7 +190,7 @@ class Positions:
         """Return whether an orientation counts from the world's x axis."""
         return turned is not None and (
             turned.type is osc.ReferenceContext.ABSOLUTE
-            or (turned.type is None and self._minor < RELATIVE_SINCE)
+            or (turned.type is None and self.minor < RELATIVE_SINCE)
         )
 
     def _append(

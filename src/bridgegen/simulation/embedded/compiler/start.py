@@ -1,6 +1,6 @@
 """The start of a storyboard: where each entity is, how fast, and which way it goes."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario import model as osc
@@ -102,7 +102,7 @@ class Start:
                     else:
                         init[name] = self._tables.slot(speed)
                 elif isinstance(
-                    action, osc.LateralAction | osc.VisibilityAction
+                    action, osc.LateralAction | osc.VisibilityAction | osc.TrailerAction
                 ) or self._actions.lamps(inner):
                     first.append((wrapped, self._tables.entity(name)))
                 elif isinstance(inner, osc.FollowTrajectoryAction) and (
@@ -124,6 +124,7 @@ class Start:
             for e, name in enumerate(self._tables.names)
             if name not in {*starts, *tracks} and name in later and not (e == 0 and has_driver)
         ]
+        self.absent += self._unmoved(storyboard, {*starts, *tracks, *later})
         waiting = {self._tables.names[e] for e in self.absent}
         self.absent += self._deleted(actions.global_actions)
         self.apart = [name in {*starts, *tracks} for name in self._tables.names]
@@ -180,6 +181,27 @@ class Start:
                 action.action, osc.AddEntityAction
             ):
                 yield self._tables.text(action.entity_ref), action.action.position
+
+    def _unmoved(self, storyboard: osc.Storyboard, placed: Collection[str]) -> list[int]:
+        """Return the entities that nothing places, leads or moves, never the ego; note them."""
+        moved = {
+            entity
+            for part in walk(storyboard)
+            if isinstance(part, osc.Actors)
+            for ref in part.entity_refs
+            for entity in self._tables.members(ref.entity_ref)
+        } | {
+            self._tables.entity(private.entity_ref)
+            for private in storyboard.init.actions.privates
+            if not all(isinstance(part.action, CONTROLLING) for part in private.private_actions)
+        }
+        found = []
+        for e, (name, obj) in enumerate(zip(self._tables.names, self._tables.objects, strict=True)):
+            if e and e not in moved and name not in placed and self._towing.towers[e] < 0:
+                sentence = f"'{name}' is absent: no action places or moves it"
+                self._tables.note(obj, sentence)
+                found.append(e)
+        return found
 
     def _deleted(self, actions: Iterable[osc.GlobalAction]) -> list[int]:
         """Return the entities that are deleted at the start."""

@@ -49,10 +49,14 @@ def compile_trajectory(tables: Tables, action: osc.FollowTrajectoryAction) -> Al
         return AlongTrajectory((), action.line)
     points = [point for position in positions if (point := _point(tables, position)) is not None]
     elements = line.vertices if isinstance(line, osc.Polyline) else (line,) * len(stated)
-    times = () if isinstance(timing, osc.NoTime) else check_times(tables, timing, stated, elements)
+    times = () if isinstance(timing, osc.NoTime) else usable_times(tables, line, stated)
+    if times and isinstance(timing, osc.Timing):
+        times = check_times(tables, timing, times, elements)
     start = tables.literal(action, "initialDistanceOffset", action.initial_distance_offset or 0.0)
-    if times and start:
-        tables.unsupported(action, f'initialDistanceOffset="{start:g}" in a trajectory with times')
+    absolute = osc.ReferenceContext.ABSOLUTE
+    if times and start and getattr(timing, "domain_absolute_relative", None) is absolute:
+        tables.note(action, "absolute times say where it is, whatever its initialDistanceOffset")
+        start = 0.0
     return AlongTrajectory(tuple(points), action.line, times, curve, start)
 
 
@@ -65,27 +69,101 @@ def _point(tables: Tables, position: osc.Position) -> Point | None:
     return LanePoint(point.road, point.lane, s, point.line, aside)
 
 
-def check_times(
-    tables: Tables, timing: osc.Timing, stated: Sequence[float | None], where: Sequence[Element]
+def usable_times(
+    tables: Tables, line: Element, stated: Sequence[float | None]
 ) -> tuple[float, ...]:
-    """Return when to be at each vertex [s]: a stated time, scaled and then moved."""
+    """Return the times of a line [s], NaN for those that lengths give; none if they give no speed.
+
+    A line that states none for its start begins at 0.
+    """
+    times = [math.nan if time is None else time for time in stated]
+    known = len(times) - stated.count(None)
+    if known and math.isnan(times[0]):
+        times[0] = 0.0
+    if len(times) - sum(map(math.isnan, times)) < 2:
+        what = "one time" if known else "no times"
+        tables.note(line, f"it states {what}: followed at the entity's own speed")
+        return ()
+    if known < len(times):
+        tables.note(
+            line,
+            f"{len(times) - known} of its {len(times)} times are missing: a missing first one is "
+            "0, the others follow from the lengths between those that are stated",
+        )
+    return tuple(times)
+
+
+def filled(times: Sequence[float], knots: Float) -> list[float]:
+    """Return times in which those that are NaN follow from the distances along the line [m].
+
+    After the last known time, the speed is that of the stretch before it.
+
+    Raises:
+        InputError: they do not increase.
+    """
+    clock = np.array(times, dtype=np.float64)
+    known = np.flatnonzero(~np.isnan(clock))
+    if len(known) < len(clock):
+        a, b = known[-2:]
+        after = np.arange(b + 1, len(clock))
+        with np.errstate(all="ignore"):
+            pace = (clock[b] - clock[a]) / (knots[b] - knots[a])
+            end = clock[b] + pace * (knots[after] - knots[b])
+        clock = np.append(np.interp(knots[: b + 1], knots[known], clock[known]), end)
+        clock[known] = np.asarray(times)[known]
+    if not (np.isfinite(clock).all() and (np.diff(clock) > 0.0).all()):
+        shown = ", ".join(f"{time:g}" for time in clock[:10])
+        raise InputError(f"a trajectory whose times [s] do not increase: {shown}")
+    return [float(time) for time in clock]
+
+
+def begun(
+    corners: Sequence[Corner], times: Sequence[float], start: float
+) -> tuple[list[Corner], list[float]]:
+    """Return the rest of a line from a distance on [m], where one is when the line would begin.
+
+    Raises:
+        InputError: it is not that long.
+    """
+    steps = [elementary.hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(corners)]
+    knots = np.cumsum([0.0, *steps])
+    if not start < knots[-1]:
+        limit = f"less than the trajectory's length, {knots[-1]:g}"
+        raise InputError(f"initialDistanceOffset [m] must be {limit}, got {start:g}")
+    i = int(np.searchsorted(knots, start, side="right")) - 1
+    share = float((start - knots[i]) / steps[i])
+    (x, y, h), (x_end, y_end, h_end) = corners[i : i + 2]
+    if h is not None and h_end is not None:
+        h += share * math.remainder(h_end - h, math.tau)
+    late = times[i] + share * (times[i + 1] - times[i]) - times[0]
+    first = (x + share * (x_end - x), y + share * (y_end - y), h)
+    rest = [time - late for time in times[i + 1 :]]
+    return [first, *corners[i + 1 :]], [times[0], *rest]
+
+
+def check_times(
+    tables: Tables, timing: osc.Timing, stated: Sequence[float], where: Sequence[Element]
+) -> tuple[float, ...]:
+    """Return when to be at each vertex [s]: a stated time, scaled and then moved; NaN stays."""
     scale = tables.literal(timing, "scale", timing.scale)
     offset = tables.literal(timing, "offset", timing.offset)
     times: list[float] = []
+    before = math.nan
     for time, element in zip(stated, where, strict=True):
         what = f"a {type(element).__name__}"
-        if time is None:
-            tables.unsupported(element, f"{what} without a time in a trajectory with times")
+        if math.isnan(time):
+            times.append(time)
             continue
         # As the standard says: a scale of 2 takes twice as long. esmini divides by the scale, and
         # subtracts the offset.
         times.append(scale * time + offset)
         if not math.isfinite(times[-1]):
             tables.unsupported(element, f"{what} at {times[-1]:g} s")
-        elif len(times) > 1 and not times[-1] > times[-2]:
+        elif times[-1] <= before:
             tables.unsupported(
-                element, f"{what} at {times[-1]:g} s after one at {times[-2]:g} s (not later)"
+                element, f"{what} at {times[-1]:g} s after one at {before:g} s (not later)"
             )
+        before = times[-1]
     return tuple(times)
 
 
@@ -129,7 +207,7 @@ def polyline(corners: Sequence[Corner], *, may_stand: bool = False) -> tuple[Flo
     ), step
 
 
-def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
+def timetable(corners: Sequence[Corner], times: Sequence[float], start: float = 0.0) -> Float:
     """Return the timed poses of an entity that follows a trajectory.
 
     Position is linear between two vertices. Heading turns the short way round between two that
@@ -138,6 +216,7 @@ def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
     Args:
         corners: V ≥ 2 vertices.
         times: their times [s], increasing.
+        start: how far along its line the first one is [m].
 
     Returns:
         ``(V - 1, 10)``, a row per segment; see ``_follow_kernels``.
@@ -145,7 +224,7 @@ def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
     clock = np.asarray(times, dtype=np.float64)
     place = np.array([corner[:2] for corner in corners], dtype=np.float64)
     steps = np.diff(place, axis=0)
-    knots = np.cumsum([0.0, *elementary.hypot(steps[:, 0], steps[:, 1])])
+    knots = np.cumsum([start, *elementary.hypot(steps[:, 0], steps[:, 1])])
     begins, ends = _headings(corners, place)
     columns = (clock[:-1], clock[1:], *place[:-1].T, *place[1:].T, begins, ends)
     return np.stack((*columns, knots[:-1], knots[1:]), axis=1)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -35,7 +36,13 @@ from bridgegen.openx.opendrive.routes import (
 )
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
 from bridgegen.simulation.embedded.compiler import curves as clothoids
-from bridgegen.simulation.embedded.compiler.trajectories import Corner, polyline, timetable
+from bridgegen.simulation.embedded.compiler.trajectories import (
+    Corner,
+    begun,
+    filled,
+    polyline,
+    timetable,
+)
 from bridgegen.simulation.embedded.places.lanes import Lanes, Path, sampled
 from bridgegen.simulation.embedded.places.slopes import slopes
 from bridgegen.simulation.embedded.program import (
@@ -328,10 +335,20 @@ class Ways:
         else:
             line = polyline(corners, may_stand=bool(spec.times))
         times: Sequence[float] = spec.times
+        if times:
+            ahead = [bend.length for bend in spec.bends] or [
+                elementary.hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(corners)
+            ]
+            knots = np.cumsum([0.0, *ahead])
+            try:
+                times = filled(times, knots)
+            except InputError as error:
+                raise InputError(f"line {spec.line}: {error}") from None
         if spec.bends and times:
-            knots = np.cumsum([0.0, *(bend.length for bend in spec.bends)])
             times = np.interp(np.arange(len(corners)) * line[1], knots, times).tolist()
-        self.timetables.append(timetable(corners, times) if times else _NO_TIMES)
+        if times and spec.start:
+            corners, times = begun(corners, times, spec.start)
+        self.timetables.append(timetable(corners, times, spec.start) if times else _NO_TIMES)
         self._add_line(line, LANDS, spec.start)
 
     def _add_line(self, line: tuple[Float, float], follows: int, start: float = 0.0) -> None:
