@@ -109,6 +109,7 @@ def read_sentence(text: str, like: str | None = None) -> Sentence:
             or a value that the scenario does not have.
         UnknownNameError: no such scenario.
     """
+    text = " ".join(text.split())
     if len(text) > MAX_LENGTH:
         raise InputError(f"a sentence has {MAX_LENGTH} characters at most, got {len(text)}")
     if like is not None and like not in names():
@@ -122,7 +123,7 @@ def read_sentence(text: str, like: str | None = None) -> Sentence:
         readings = _readings(matches, len(words.words), needs_event=like is None)
         if len(readings) > 1:
             meant = [_meaning(reading) for reading in readings]
-            ways = set().union(*meant) - meant[0].intersection(*meant)
+            ways = frozenset().union(*meant) - meant[0].intersection(*meant)
             told = " or ".join(sorted(f"{key}: {value}" for key, value in ways))
             raise InputError(f"'{text}' has two meanings in {name}: {told}")
         complete += [(scenario, reading) for reading in readings]
