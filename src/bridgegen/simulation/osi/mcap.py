@@ -34,48 +34,41 @@ def mcap(
         metadata: name and entries of the file's metadata.
         of_channel: the channel's metadata.
     """
-    at = 0
-
-    def placed(data: bytes) -> bytes:
-        nonlocal at
-        at += len(data)
-        return data
-
-    yield placed(MAGIC + _record(_HEADER, _text("") + _text("bridgegen")))
+    start = MAGIC + _record(_HEADER, _text("") + _text("bridgegen"))
     about = _record(_METADATA, _text(metadata[0]) + _map(metadata[1]))
-    metadata_index = _record(
-        _METADATA_INDEX, struct.pack("<QQ", at, len(about)) + _text(metadata[0])
-    )
-    yield placed(about)
-    head = _record(
-        _SCHEMA, struct.pack("<H", _ID) + _text(type_) + _text("protobuf") + _data(schema)
-    )
+    where = struct.pack("<QQ", len(start), len(about))
+    metadata_index = _record(_METADATA_INDEX, where + _text(metadata[0]))
+    yield start + about
+    at = len(start) + len(about)
+    type_of = struct.pack("<H", _ID) + _text(type_) + _text("protobuf") + _data(schema)
     channel = struct.pack("<HH", _ID, _ID) + _text(topic) + _text("protobuf") + _map(of_channel)
-    head += _record(_CHANNEL, channel)
+    head = _record(_SCHEMA, type_of) + _record(_CHANNEL, channel)
     indices, times = list[bytes](), list[int]()
     for begins, chunk in _chunks(head, messages):
         times += [time for time, _ in begins]
-        first, last = min(begins)[0], max(begins)[0]
-        extent = struct.pack("<QQ", first, last)
-        crc = struct.pack("<QI", len(chunk), zlib.crc32(chunk))
-        record = _record(_CHUNK, extent + crc + _text("") + struct.pack("<Q", len(chunk)) + chunk)
+        extent, size = struct.pack("<QQ", min(begins)[0], max(begins)[0]), len(chunk)
+        # Large ones are not copied, as `_record` would.
+        fields = extent + struct.pack("<QI", size, zlib.crc32(chunk)) + _text("")
+        record = struct.pack("<BQ", _CHUNK, len(fields) + 8 + size) + fields
+        record += struct.pack("<Q", size)
         entries = b"".join(struct.pack("<QQ", *begin) for begin in begins)
         index = _record(_MESSAGE_INDEX, struct.pack("<H", _ID) + _data(entries))
-        where = struct.pack("<QQ", at, len(record))
-        offsets = _data(struct.pack("<HQ", _ID, at + len(record)))
-        sizes = struct.pack("<QQ", len(chunk), len(chunk))
-        content = extent + where + offsets + struct.pack("<Q", len(index)) + _text("") + sizes
+        yield record
+        yield chunk
+        yield index
+        end = at + len(record) + size
+        content = extent + struct.pack("<QQ", at, end - at) + _data(struct.pack("<HQ", _ID, end))
+        content += struct.pack("<Q", len(index)) + _text("") + struct.pack("<QQ", size, size)
         indices.append(_record(_CHUNK_INDEX, content))
-        yield placed(record)
-        yield placed(index)
-    yield placed(_record(_DATA_END, struct.pack("<I", 0)))
+        at = end + len(index)
+    data_end = _record(_DATA_END, struct.pack("<I", 0))
     counts = struct.pack("<QHIIII", len(times), 1, 1, 0, 1, len(indices))
     extent = struct.pack("<QQ", min(times, default=0), max(times, default=0))
     statistics = counts + extent + _data(struct.pack("<HQ", _ID, len(times)))
     summary = head + b"".join(indices) + metadata_index + _record(_STATISTICS, statistics)
-    footer = struct.pack("<QQ", at, 0)
+    footer = struct.pack("<QQ", at + len(data_end), 0)
     begun = bytes([_FOOTER]) + struct.pack("<Q", len(footer) + 4) + footer
-    yield summary + begun + struct.pack("<I", zlib.crc32(summary + begun)) + MAGIC
+    yield data_end + summary + begun + struct.pack("<I", zlib.crc32(summary + begun)) + MAGIC
 
 
 def _chunks(

@@ -7,7 +7,6 @@ Source: ASAM OSI 3.7.0; Protocol Buffers, "Encoding" and descriptor.proto.
 """
 
 import struct
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,20 +19,19 @@ Parts = list[bytes | npt.NDArray[Any]]
 
 _MESSAGES = """
 GroundTruth: version InterfaceVersion 1, timestamp Timestamp 2, host_vehicle_id Identifier 3,
-    stationary_object StationaryObject* 4, moving_object MovingObject* 5,
-    traffic_sign TrafficSign* 6, traffic_light TrafficLight* 7, road_marking RoadMarking* 8,
-    lane_boundary LaneBoundary* 9, lane Lane* 10,
-    environmental_conditions EnvironmentalConditions 12, proj_string string 14,
-    map_reference string 15, reference_line ReferenceLine* 17,
-    logical_lane_boundary LogicalLaneBoundary* 18, logical_lane LogicalLane* 19
+    stationary_object Unused* 4, moving_object MovingObject* 5, traffic_sign Unused* 6,
+    traffic_light TrafficLight* 7, road_marking Unused* 8, lane_boundary LaneBoundary* 9,
+    lane Lane* 10, environmental_conditions EnvironmentalConditions 12, reference_line Unused* 17,
+    logical_lane_boundary Unused* 18, logical_lane Unused* 19
 SensorView: version InterfaceVersion 1, timestamp Timestamp 2, sensor_id Identifier 3,
     global_ground_truth GroundTruth 7, host_vehicle_id Identifier 8,
-    generic_sensor_view GenericSensorView* 1000, radar_sensor_view RadarSensorView* 1001,
-    lidar_sensor_view LidarSensorView* 1002, camera_sensor_view CameraSensorView* 1003,
-    ultrasonic_sensor_view UltrasonicSensorView* 1004
+    generic_sensor_view Unused* 1000, radar_sensor_view Unused* 1001,
+    lidar_sensor_view Unused* 1002, camera_sensor_view Unused* 1003,
+    ultrasonic_sensor_view Unused* 1004
 InterfaceVersion: version_major uint32 1, version_minor uint32 2, version_patch uint32 3
 Timestamp: seconds int64 1, nanos uint32 2
 Identifier: value uint64 1
+Unused: id Identifier 1
 ExternalReference: reference string 1, type string 2, identifier string* 3
 Dimension3d: length double 1, width double 2, height double 3
 Vector3d: x double 1, y double 2, z double 3
@@ -41,55 +39,34 @@ Orientation3d: roll double 1, pitch double 2, yaw double 3
 BaseMoving: dimension Dimension3d 1, position Vector3d 2, orientation Orientation3d 3,
     velocity Vector3d 4, acceleration Vector3d 5, orientation_rate Orientation3d 6
 BaseStationary: dimension Dimension3d 1, position Vector3d 2, orientation Orientation3d 3
-MovingObject: id Identifier 1, base BaseMoving 2, type MovingObject.Type 3,
-    vehicle_attributes MovingObject.VehicleAttributes 5,
-    vehicle_classification MovingObject.VehicleClassification 6, model_reference string 7,
-    moving_object_classification MovingObject.MovingObjectClassification 9,
+MovingObject: id Identifier 1, base BaseMoving 2, type .Type 3,
+    vehicle_attributes .VehicleAttributes 5, vehicle_classification .VehicleClassification 6,
+    model_reference string 7, moving_object_classification .MovingObjectClassification 9,
     source_reference ExternalReference* 10
 MovingObject.VehicleAttributes: bbcenter_to_rear Vector3d 4
-MovingObject.VehicleClassification: type MovingObject.VehicleClassification.Type 1,
-    light_state MovingObject.VehicleClassification.LightState 2,
-    role MovingObject.VehicleClassification.Role 5
-MovingObject.VehicleClassification.LightState:
-    indicator_state MovingObject.VehicleClassification.LightState.IndicatorState 1,
-    brake_light_state MovingObject.VehicleClassification.LightState.BrakeLightState 7,
-    emergency_vehicle_illumination
-    MovingObject.VehicleClassification.LightState.GenericLightState 9
+MovingObject.VehicleClassification: type .Type 1, light_state .LightState 2, role .Role 5
+MovingObject.VehicleClassification.LightState: indicator_state .IndicatorState 1,
+    brake_light_state .BrakeLightState 7, emergency_vehicle_illumination .GenericLightState 9
 MovingObject.MovingObjectClassification: assigned_lane_id Identifier* 1
-TrafficLight: id Identifier 1, base BaseStationary 2, classification TrafficLight.Classification 3,
+TrafficLight: id Identifier 1, base BaseStationary 2, classification .Classification 3,
     model_reference string 4, source_reference ExternalReference* 5
-TrafficLight.Classification: color TrafficLight.Classification.Color 1,
-    icon TrafficLight.Classification.Icon 2, mode TrafficLight.Classification.Mode 3,
+TrafficLight.Classification: color .Color 1, icon .Icon 2, mode .Mode 3,
     assigned_lane_id Identifier* 5
-LaneBoundary: id Identifier 1, boundary_line LaneBoundary.BoundaryPoint* 2,
-    classification LaneBoundary.Classification 3
+LaneBoundary: id Identifier 1, boundary_line .BoundaryPoint* 2, classification .Classification 3
 LaneBoundary.BoundaryPoint: position Vector3d 1, width double 2, height double 3
-LaneBoundary.Classification: type LaneBoundary.Classification.Type 1,
-    color LaneBoundary.Classification.Color 2
-Lane: id Identifier 1, classification Lane.Classification 2, source_reference ExternalReference* 3
-Lane.Classification: type Lane.Classification.Type 1, centerline Vector3d* 3,
-    centerline_is_driving_direction bool 4, left_adjacent_lane_id Identifier* 5,
-    right_adjacent_lane_id Identifier* 6, lane_pairing Lane.Classification.LanePairing* 7,
-    right_lane_boundary_id Identifier* 8, left_lane_boundary_id Identifier* 9,
-    free_lane_boundary_id Identifier* 10, subtype Lane.Classification.Subtype 12
+LaneBoundary.Classification: type .Type 1, color .Color 2
+Lane: id Identifier 1, classification .Classification 2, source_reference ExternalReference* 3
+Lane.Classification: type .Type 1, centerline Vector3d* 3, centerline_is_driving_direction bool 4,
+    left_adjacent_lane_id Identifier* 5, right_adjacent_lane_id Identifier* 6,
+    lane_pairing .LanePairing* 7, right_lane_boundary_id Identifier* 8,
+    left_lane_boundary_id Identifier* 9, free_lane_boundary_id Identifier* 10, subtype .Subtype 12
 Lane.Classification.LanePairing: antecessor_lane_id Identifier 1, successor_lane_id Identifier 2
-EnvironmentalConditions:
-    ambient_illumination EnvironmentalConditions.AmbientIllumination 1,
-    precipitation EnvironmentalConditions.Precipitation 6, fog EnvironmentalConditions.Fog 7
-StationaryObject: id Identifier 1
-TrafficSign: id Identifier 1
-RoadMarking: id Identifier 1
-ReferenceLine: id Identifier 1
-LogicalLaneBoundary: id Identifier 1
-LogicalLane: id Identifier 1
-GenericSensorView:
-RadarSensorView:
-LidarSensorView:
-CameraSensorView:
-UltrasonicSensorView:
+EnvironmentalConditions: ambient_illumination .AmbientIllumination 1,
+    precipitation .Precipitation 6, fog .Fog 7
 """
-"""Each message's fields: name, type (``*`` where it may come several times) and number. Those at
-the end are never written; viewers ask for the lists of them."""
+"""Each message's fields: name, type and number. A type has ``*`` where the field may come several
+times; one that begins with a dot is the message's own. Lists of what is never written are declared,
+for viewers ask for them."""
 
 _ENUMS = """
 MovingObject.Type TYPE: UNKNOWN OTHER VEHICLE PEDESTRIAN ANIMAL
@@ -102,16 +79,14 @@ MovingObject.VehicleClassification.LightState.IndicatorState INDICATOR_STATE: UN
 MovingObject.VehicleClassification.LightState.BrakeLightState BRAKE_LIGHT_STATE: UNKNOWN OTHER OFF
     NORMAL STRONG
 MovingObject.VehicleClassification.LightState.GenericLightState GENERIC_LIGHT_STATE: UNKNOWN OTHER
-    OFF ON FLASHING_BLUE FLASHING_BLUE_AND_RED FLASHING_AMBER
-TrafficLight.Classification.Color COLOR: UNKNOWN OTHER RED YELLOW GREEN BLUE WHITE
+    OFF ON FLASHING_BLUE
+TrafficLight.Classification.Color COLOR: UNKNOWN OTHER RED YELLOW GREEN
 TrafficLight.Classification.Icon ICON: UNKNOWN OTHER NONE
-TrafficLight.Classification.Mode MODE: UNKNOWN OTHER OFF CONSTANT FLASHING COUNTING
+TrafficLight.Classification.Mode MODE: UNKNOWN OTHER OFF CONSTANT FLASHING
 LaneBoundary.Classification.Type TYPE: UNKNOWN OTHER NO_LINE SOLID_LINE DASHED_LINE BOTTS_DOTS
-    ROAD_EDGE SNOW_EDGE GRASS_EDGE GRAVEL_EDGE SOIL_EDGE GUARD_RAIL CURB STRUCTURE BARRIER
-    SOUND_BARRIER
-LaneBoundary.Classification.Color COLOR: UNKNOWN OTHER NONE WHITE YELLOW RED BLUE GREEN VIOLET
-    ORANGE
-Lane.Classification.Type TYPE: UNKNOWN OTHER DRIVING NONDRIVING INTERSECTION
+    ROAD_EDGE SNOW_EDGE GRASS_EDGE GRAVEL_EDGE SOIL_EDGE GUARD_RAIL CURB
+LaneBoundary.Classification.Color COLOR: UNKNOWN OTHER NONE WHITE
+Lane.Classification.Type TYPE: UNKNOWN OTHER DRIVING NONDRIVING
 Lane.Classification.Subtype SUBTYPE: UNKNOWN OTHER NORMAL BIKING SIDEWALK PARKING STOP RESTRICTED
     BORDER SHOULDER EXIT ENTRY ONRAMP OFFRAMP CONNECTINGRAMP
 EnvironmentalConditions.AmbientIllumination AMBIENT_ILLUMINATION: UNKNOWN OTHER LEVEL1 LEVEL2
@@ -136,15 +111,15 @@ def _entries(text: str) -> list[tuple[str, str]]:
     return [(head, rest.strip()) for head, _, rest in (line.partition(":") for line in lines)]
 
 
-def _field(text: str) -> tuple[str, _Field]:
-    name, kind, number = text.split()
-    return name, _Field(kind.rstrip("*"), int(number), kind.endswith("*"))
+def _fields(name: str, text: str) -> dict[str, _Field]:
+    each = [field.split() for field in text.split(",")]
+    return {
+        field: _Field((name if kind[0] == "." else "") + kind.strip("*"), int(number), "*" in kind)
+        for field, kind, number in each
+    }
 
 
-_FIELDS = {
-    name: dict(_field(each) for each in rest.split(",") if rest)
-    for name, rest in _entries(_MESSAGES)
-}
+_FIELDS = {name: _fields(name, rest) for name, rest in _entries(_MESSAGES)}
 VALUES = {head.split()[0]: rest.split() for head, rest in _entries(_ENUMS)}
 """The values of each enumeration, in order."""
 _PREFIXES = dict(head.split() for head, _ in _entries(_ENUMS))
@@ -229,12 +204,10 @@ def rows(parts: Parts, n: int) -> list[bytes]:
 
 def schema() -> bytes:
     """Return the part of OSI's schema that is declared here, as a FileDescriptorSet."""
-    top = [name for name in _FIELDS if "." not in name]
-    parts = [
-        *nested(1, [b"osi3.proto"]),
-        *nested(2, [b"osi3"]),
-        *(part for name in top for part in nested(4, _descriptor(name))),
-    ]
+    parts = [*nested(1, [b"osi3.proto"]), *nested(2, [b"osi3"])]
+    for name in _FIELDS:
+        if "." not in name:
+            parts += nested(4, _descriptor(name))
     return flat(nested(1, parts))
 
 
@@ -242,31 +215,28 @@ def _descriptor(name: str) -> Parts:
     """Return the DescriptorProto of a message."""
     found = nested(1, [_last(name)])
     for field, (kind, number, repeated) in _FIELDS[name].items():
-        scalar = _SCALARS.get(kind)
+        of = _SCALARS.get(kind) or (_MESSAGE if kind in _FIELDS else _ENUM)
         about = nested(1, [field.encode()])
-        about += _numbers(3, number) + _numbers(4, _REPEATED if repeated else _OPTIONAL)
-        about += _numbers(5, scalar or (_MESSAGE if kind in _FIELDS else _ENUM))
-        if scalar is None:
+        about.append(_numbers((3, number), (4, _REPEATED if repeated else _OPTIONAL), (5, of)))
+        if kind not in _SCALARS:
             about += nested(6, [f".osi3.{kind}".encode()])
         found += nested(2, about)
-    for inner in _inside(name, tuple(_FIELDS)):
-        found += nested(3, _descriptor(inner))
-    for inner in _inside(name, tuple(VALUES)):
-        values = nested(1, [_last(inner)])
-        for number, value in enumerate(VALUES[inner]):
-            label = f"{_PREFIXES[inner]}_{value}".encode()
-            values += nested(2, [*nested(1, [label]), *_numbers(2, number)])
-        found += nested(4, values)
+    for inner in _FIELDS:
+        if inner.rpartition(".")[0] == name:
+            found += nested(3, _descriptor(inner))
+    for inner, words in VALUES.items():
+        if inner.rpartition(".")[0] == name:
+            values = nested(1, [_last(inner)])
+            for number, word in enumerate(words):
+                label = nested(1, [f"{_PREFIXES[inner]}_{word}".encode()])
+                values += nested(2, [*label, _numbers((2, number))])
+            found += nested(4, values)
     return found
-
-
-def _inside(name: str, names: Sequence[str]) -> list[str]:
-    return [each for each in names if each.rpartition(".")[0] == name]
 
 
 def _last(name: str) -> bytes:
     return name.rpartition(".")[2].encode()
 
 
-def _numbers(number: int, value: int) -> Parts:
-    return [_key(number, _VARINT) + varint(value)]
+def _numbers(*fields: tuple[int, int]) -> bytes:
+    return b"".join(_key(number, _VARINT) + varint(value) for number, value in fields)

@@ -47,7 +47,7 @@ ENDINGS = {GROUND_TRUTH: "_gt.mcap", SENSOR_VIEW: "_sv.mcap"}
 
 REACH = 150.0
 """Largest distance of a lane from the rectangle that holds all participants [m]."""
-STRAIGHT = 0.01
+STRAIGHT = 0.02
 """Largest distance of a line from its points that are left out [m]."""
 
 _VEHICLES = {
@@ -73,6 +73,8 @@ _FOGS = VALUES["EnvironmentalConditions.Fog"][:1:-1]
 _LIT = (0.01, 1.0, 3.0, 10.0, 20.0, 400.0, 1000.0, 10_000.0)  # lx
 _ALBEDO = 0.2  # of what ``BACKGROUND`` is the luminance of, see ``drivers._physics_kernels``
 
+_SOURCE = "net.asam.openscenario"
+"""Where the names of participants are from."""
 _EGO = 1
 """The ego's id; those of the others, of borders, lanes and lamps follow."""
 
@@ -90,33 +92,30 @@ class Surroundings:
     weather: Sequence[tuple[int, Float]] = ()
 
 
-def write_osi(path: Path, rollout: Rollout, around: Surroundings, row: int = 0) -> None:
-    """Write one scenario of a rollout as an MCAP file, whole or not at all.
+def write_osi(paths: Sequence[Path], rollout: Rollout, around: Surroundings, row: int = 0) -> None:
+    """Write one scenario of a rollout as MCAP files, each whole or not at all.
 
     Args:
-        path: the file; of SensorViews if its name ends in _sv.mcap, else of GroundTruths.
+        paths: the files; one whose name ends in _sv.mcap has SensorViews, another GroundTruths.
         rollout: N scenarios.
         around: the map and the weather of that scenario.
         row: which of them.
 
     Raises:
-        StorageError: it cannot be written.
+        StorageError: one cannot be written.
     """
-    kind = SENSOR_VIEW if path.name.lower().endswith(ENDINGS[SENSOR_VIEW]) else GROUND_TRUTH
-    truths = ground_truths(rollout, around, row)
+    truths = [*ground_truths(rollout, around, row)]
     version, library = ".".join(map(str, VERSION)), "3.0.0"  # any that reads these bytes
     about = dict.fromkeys(("version", "min_osi_version", "max_osi_version"), version)
     about |= dict.fromkeys(("min_protobuf_version", "max_protobuf_version"), library)
     versions = {"osi_version": version, "protobuf_version": library}
-    chunks = mcap(
-        topic=kind,
-        type_=f"osi3.{kind}",
-        schema=schema(),
-        messages=truths if kind == GROUND_TRUTH else map(_sensor_view, truths),
-        metadata=("net.asam.osi.trace", about),
-        of_channel={f"net.asam.osi.trace.channel.{key}": text for key, text in versions.items()},
-    )
-    write_whole(path, chunks)
+    channel = {f"net.asam.osi.trace.channel.{key}": text for key, text in versions.items()}
+    for path in paths:
+        is_view = path.name.lower().endswith(ENDINGS[SENSOR_VIEW])
+        kind = SENSOR_VIEW if is_view else GROUND_TRUTH
+        messages = map(_sensor_view, truths) if is_view else truths
+        metadata = ("net.asam.osi.trace", about)
+        write_whole(path, mcap(kind, f"osi3.{kind}", schema(), messages, metadata, channel))
 
 
 def _sensor_view(truth: tuple[int, bytes]) -> tuple[int, bytes]:
@@ -172,12 +171,6 @@ def _size(length: float, width: float, height: float) -> Parts:
     return message("Dimension3d", length=length, width=width, height=height)
 
 
-def _named(standard: str, *identifier: str) -> list[Parts]:
-    """Return what an object is called in the file that it is from."""
-    source = f"net.asam.{standard}"
-    return [message("ExternalReference", type=source, identifier=identifier)]
-
-
 def _codes(enum: str, where: Any, value: str, otherwise: str = "OFF") -> Any:
     """Return one value of an enumeration where a condition holds, another one elsewhere."""
     numbers = (VALUES[enum].index(word) for word in (value, otherwise))
@@ -214,13 +207,14 @@ def _object(rollout: Rollout, row: int, e: int, n: int) -> Parts:
                 f"{name}Classification", type=_VEHICLES[kind], light_state=state, role="CIVIL"
             ),
         }
+    identifier = [element, rollout.names[e]]
     return message(
         "MovingObject",
         id=_id(_EGO + e),
         base=base,
         type="VEHICLE" if vehicle else _TYPES.get(kind, "UNKNOWN"),
         **vehicle,
-        source_reference=_named("openscenario", element, rollout.names[e]),
+        source_reference=[message("ExternalReference", type=_SOURCE, identifier=identifier)],
     )
 
 
@@ -307,7 +301,6 @@ def _road(model: OpenDrive, rollout: Rollout, row: int, n: int) -> tuple[bytes, 
                     mode=_codes(f"{kind}.Mode", np.isin(states, lit), "CONSTANT"),
                     assigned_lane_id=_known(ids, *governed[pole.id]),
                 ),
-                source_reference=_named("opendrive", "traffic_light", pole.id),
             )
             lamps.append(nested(7, lamp))
     return flat(parts), lamps
@@ -358,8 +351,7 @@ def _lane(lane: "Lane", ids: dict[str, Parts], left: Parts, right: Parts) -> Par
         left_lane_boundary_id=[left],
         subtype=subtype if subtype in VALUES[f"{kind}.Subtype"] else "OTHER",
     )
-    named = _named("opendrive", *lane.id.split(":"))
-    return message("Lane", id=ids[lane.id], classification=classification, source_reference=named)
+    return message("Lane", id=ids[lane.id], classification=classification)
 
 
 def _thinned(points: Float) -> Float:
