@@ -129,12 +129,8 @@ def export_traces(
         The files written.
 
     Raises:
-        UnknownNameError: no such scenario in the run, or driver.
-        InputError: a run that kept no scenario; a scenario whose simulation fails; scenarios or a
-            driver of a recording; a recording that is too large.
-        FileFormatError: a file is missing, malformed, inconsistent or of no known format.
-        UnsupportedError: what the simulator cannot do, by name and line.
-        StorageError: not a run, or the files cannot be written.
+        BridgeGenError: as `export`; or scenarios or a driver are chosen of a recording, or one is
+            too large or of no known format.
     """
     traces: Iterable[tuple[str, Rollout, Surroundings]]
     if source.is_dir() or source.suffix.lower() == ".xosc":

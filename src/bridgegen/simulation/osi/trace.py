@@ -52,9 +52,8 @@ STRAIGHT = 0.02
 
 _VEHICLES = {
     "car": "MEDIUM_CAR", "truck": "HEAVY_TRUCK", "bus": "BUS", "motorcycle": "MOTORBIKE",
-    "bicycle": "BICYCLE", "tram": "TRAM", "e-scooter": "STANDUP_SCOOTER",
+    "bicycle": "BICYCLE", "tram": "TRAM", "e-scooter": "STANDUP_SCOOTER", "": "OTHER",
 }  # fmt: skip
-_TYPES = {"pedestrian": "PEDESTRIAN", "animal": "ANIMAL", "other": "OTHER"}
 _HEIGHTS = {kind.seen_as.name: kind.body.height for kind in reversed([*PARTICIPANTS.values()])}
 _HEIGHT = 1.5  # m, where the kind is unknown
 _SUBTYPES = {"driving": "NORMAL", "walking": "SIDEWALK"}
@@ -171,15 +170,16 @@ def _size(length: float, width: float, height: float) -> Parts:
     return message("Dimension3d", length=length, width=width, height=height)
 
 
-def _codes(enum: str, where: Any, value: str, otherwise: str = "OFF") -> Any:
-    """Return one value of an enumeration where a condition holds, another one elsewhere."""
-    numbers = (VALUES[enum].index(word) for word in (value, otherwise))
-    return np.where(where, *numbers).astype(np.uint8)
+def _codes(enum: str, where: Any, value: str) -> Any:
+    """Return a value of an enumeration where a condition holds, "OFF" elsewhere."""
+    on, off = (VALUES[enum].index(word) for word in (value, "OFF"))
+    return np.where(where, on, off).astype(np.uint8)
 
 
 def _object(rollout: Rollout, row: int, e: int, n: int) -> Parts:
     """Return a participant at its n instants."""
-    kind = kinds.NAMES[rollout.kinds[e]] if len(rollout.kinds) else ""
+    known = len(rollout.kinds) and rollout.kinds[e] >= 0
+    kind = kinds.NAMES[rollout.kinds[e]] if known else ""
     length, width, ahead = rollout.box[e].tolist()
     height = _HEIGHTS.get(kind, _HEIGHT)
     x, y, h, v, a = (getattr(rollout, name)[row, e, :n] for name in ("x", "y", "h", "v", "a"))
@@ -196,7 +196,7 @@ def _object(rollout: Rollout, row: int, e: int, n: int) -> Parts:
         orientation_rate=_turned(rate),
     )
     vehicle: dict[str, Parts] = {}
-    element = {"": "Vehicle", "other": "MiscObject"}.get(kind, "Pedestrian")
+    element = "MiscObject" if kind == "other" else "Pedestrian"
     if kind in _VEHICLES:
         element, name = "Vehicle", "MovingObject.Vehicle"
         state = _lights(rollout, row, e, n)
@@ -212,7 +212,7 @@ def _object(rollout: Rollout, row: int, e: int, n: int) -> Parts:
         "MovingObject",
         id=_id(_EGO + e),
         base=base,
-        type="VEHICLE" if vehicle else _TYPES.get(kind, "UNKNOWN"),
+        type="VEHICLE" if vehicle else kind.upper(),
         **vehicle,
         source_reference=[message("ExternalReference", type=_SOURCE, identifier=identifier)],
     )
@@ -223,15 +223,11 @@ def _lights(rollout: Rollout, row: int, e: int, n: int) -> Parts:
     if rollout.lamps.size:
         lit = rollout.lamps[row, e, :n].astype(np.int64)
     else:
-        brakes = rollout.a[row, e, :n] < -kinds.BRAKE_LIGHTS_FROM
-        lit = np.where(brakes, kinds.BRAKE, 0)
-    state, sides = "MovingObject.VehicleClassification.LightState", lit & kinds.HAZARD
-    indicator = _codes(f"{state}.IndicatorState", sides == kinds.LEFT, "LEFT")
-    for bits, word in ((kinds.RIGHT, "RIGHT"), (kinds.HAZARD, "WARNING")):
-        indicator += _codes(f"{state}.IndicatorState", sides == bits, word) - 2  # 2: off
+        lit = kinds.BRAKE * (rollout.a[row, e, :n] < -kinds.BRAKE_LIGHTS_FROM)
+    state = "MovingObject.VehicleClassification.LightState"
     return message(
         state,
-        indicator_state=indicator,
+        indicator_state=(2 + (lit & kinds.HAZARD)).astype(np.uint8),  # off, left, right, warning
         brake_light_state=_codes(f"{state}.BrakeLightState", lit & kinds.BRAKE, "NORMAL"),
         emergency_vehicle_illumination=_codes(
             f"{state}.GenericLightState", lit & kinds.BLUE, "FLASHING_BLUE"
