@@ -4,18 +4,23 @@ python benchmarks/risk.py coverage [--repeats 400] [--budget 60000] [METHOD …]
 python benchmarks/risk.py scenarios FOLDER [--pairs SCENARIO/DRIVER …]
 python benchmarks/risk.py rate FOLDER [--pairs SCENARIO/DRIVER …] [--seeds 3] [--budget 1000]
 python benchmarks/risk.py known [--repeats 200] [--budget 600]
+python benchmarks/risk.py total [--repeats 200] [--budget 30000]
+python benchmarks/risk.py near-misses [--repeats 200]
 
 ``coverage``: on the analytic problems of the tests, whose probability is known. ``scenarios``: of
 catalogue scenarios, with exposures under which harm is rare. The truth is counted without any
 estimator: rows that are uniform over the ranges are simulated, and the harmful ones weighted by how
 likely they are. ``rate``: failures and rates from one budget (``search --rate``) in the same cases,
 beside a search without rates, and Monte Carlo of the same budget. ``known``: how often intervals of
-``search --rate`` hold a truth that is known. Stopped and started again, it goes on.
+``search --rate`` hold a truth that is known. ``total``: how often the interval
+of a sum over scenarios does, with encounters that are counted; ``near-misses``: that of extreme
+values. Stopped and started again, it goes on.
 """
 
 import argparse
 import importlib.util
 import json
+import math
 import sys
 import time
 from collections.abc import Mapping
@@ -25,13 +30,23 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import scipy.stats
 
 from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.base.statistics import clopper_pearson
 from bridgegen.jobs.compare.record import distinct, normalised, space_of
 from bridgegen.jobs.risk.estimators.problem import Aim
-from bridgegen.jobs.risk.estimators.weighted import Probability, of_weights
+from bridgegen.jobs.risk.estimators.total import (
+    DRAWS,
+    Part,
+    Total,
+    rates_of,
+    shared_out,
+    total_of,
+)
+from bridgegen.jobs.risk.estimators.weighted import Probability, Weighted, of_weights
 from bridgegen.jobs.risk.experiment import estimate
+from bridgegen.jobs.risk.extremes import of_near_misses
 from bridgegen.jobs.risk.result import Risk
 from bridgegen.jobs.risk.risk import estimate_risk
 from bridgegen.jobs.search import Run, run_search
@@ -119,6 +134,122 @@ def of_rate(problem: Any, seed: int, budget: int) -> Frequency:
         score = np.concatenate([score, found])
     drawn = Drawn(algorithm.draws.take(budget), np.arange(budget), problem.share, "")
     return how_likely(drawn, score[:budget] >= 0.0)
+
+
+COUNTED = {
+    "40 rare ones, rates known": (np.full(40, 1.0), np.full(40, 5e-4), 1000, math.inf),
+    "40 rare ones, 10 encounters each": (np.full(40, 1.0), np.full(40, 5e-4), 1000, 10.0),
+    "20 rarer ones, 1.5 encounters each": (np.full(20, 0.3), np.full(20, 1e-3), 1000, 5.0),
+    "12 of all sizes": (np.logspace(-2, 1, 12), np.logspace(-5, -1, 12)[::-1], 2000, 50.0),
+    "12, the largest seldom seen": (np.logspace(-2, 1, 12), np.full(12, 3e-4), 1000, 30.0),
+    "one": (np.full(1, 1.0), np.full(1, 1e-2), 1000, 20.0),
+    "5 common ones": (np.full(5, 1.0), np.full(5, 0.5), 500, 30.0),
+}
+"""Mixtures of counts: encounters per hour, probabilities, rows of each, and hours."""
+
+
+def parts_of(found: list[Weighted], rates: Any, hours: float, seed: int) -> Total:
+    """Return the sum of what estimators found, with encounters that are counted for some hours."""
+    random, parts = np.random.default_rng((seed, 1)), []
+    for weighted, rate in zip(found, rates, strict=True):
+        drawn = (np.full(DRAWS, rate),) * 2
+        if math.isfinite(hours):
+            count = int(random.poisson(rate * hours))
+            rate, drawn = count / hours, rates_of(count, hours, random)
+        there = weighted.there(0.0)
+        draws = weighted.draws(there, random, DRAWS)
+        parts.append(Part(rate, drawn, weighted.mean(there).estimate, draws))
+    return total_of(parts)
+
+
+def counts(p: Any, rows: int, seed: int) -> list[Weighted]:
+    """Return counted rows of each probability."""
+    random, none = np.random.default_rng((seed, 0)), np.empty(0, np.int64)
+    hits = random.binomial(rows, p)
+    one = (1.0, 1.0, 1.0)
+    return [
+        Weighted(np.zeros((h, 1)), np.zeros((h, 2)), np.full(h, 1.0 / rows), rows, none, 0,
+                 1.0 / rows, one, rows)
+        for h in hits
+    ]  # fmt: skip
+
+
+def in_rounds(problems: list[Any], rates: Any, budget: int, seed: int) -> list[Weighted]:
+    """Return the last round of estimates, whose budgets earlier ones decide."""
+    spreads, left = [1.0] * len(problems), budget
+    for turn, (share, method) in enumerate(((0.1, "mc"), (0.2, "auto"), (1.0, "auto"))):
+        rows = shared_out(int(min(share * budget, left)), spreads, 20)
+        found = [
+            estimate(method, problem, Aim(0.0, 0.0, n, 0.0), 1000 * seed + 10 * k + turn, None)
+            for k, (problem, n) in enumerate(zip(problems, rows, strict=True))
+        ]
+        left -= sum(one.weighted.evaluations for one in found)
+        random = np.random.default_rng((seed, turn))
+        spreads = [
+            rate * float(one.weighted.draws(one.weighted.there(0.0), random, 1000)[2].std())
+            * one.weighted.evaluations**0.5
+            for one, rate in zip(found, rates, strict=True)
+        ]  # fmt: skip
+    return [one.weighted for one in found]
+
+
+def total(repeats: int, budget: int) -> None:
+    """Print how often the interval of a sum over scenarios holds the truth."""
+    made = problems()
+    print("| scenarios | mean / truth | width / truth | held | low > truth | high < truth |")
+    print("|---|---|---|---|---|---|")
+
+    def row(name: str, truth: float, find: Any, repeats: int) -> None:
+        found = [find(seed) for seed in range(repeats)]
+        mean = np.mean([one.estimate for one in found]) / truth
+        width = np.median([one.high - one.low for one in found]) / truth
+        above, below = (np.mean([getattr(o, e) * s > truth * s for o in found])
+                        for e, s in (("low", 1), ("high", -1)))  # fmt: skip
+        print(f"| {name} | {mean:.2f} | {width:.2f} | {1 - above - below:.1%} | {above:.1%} | "
+              f"{below:.1%} |", flush=True)  # fmt: skip
+
+    for name, (rates, p, rows, hours) in COUNTED.items():
+        of = (rates, p, rows, hours)
+        row(name, float(rates @ p), lambda seed, of=of: parts_of(
+            counts(of[1], of[2], seed), of[0], of[3], seed), 2 * repeats)  # fmt: skip
+    rates = np.array([0.05, 1.3, 0.1, 5.0, 0.3, 20.0])
+    six = [made.linear(6, 2.6), made.bent(), made.two_sides(2, 2.4, 2.6), made.linear(6, 3.5),
+           made.branches(), made.linear(2, 4.75)]  # fmt: skip
+    truth = float(rates @ [one.probability for one in six])
+    row("6 problems of 1e-6 to 1e-2, by auto, in rounds", truth, lambda seed: parts_of(
+        in_rounds(six, rates, budget, seed), rates, 300.0, seed), repeats)  # fmt: skip
+
+
+def near_misses(repeats: int) -> None:
+    """Print how often the interval of extreme values holds how likely a collision is."""
+    print("| margin | rows | probability | median | known | held | below |")
+    print("|---|---|---|---|---|---|---|")
+    sf = scipy.stats
+    cases: dict[str, tuple[Any, float]] = {
+        "normal": (lambda r, n: r.normal(2.0, 0.55, n), sf.norm.cdf(-2.0 / 0.55)),
+        "Gumbel": (lambda r, n: 2.0 - r.gumbel(0.0, 0.3, n), sf.gumbel_r.sf(2.0 / 0.3)),
+        "exponential": (lambda r, n: 3.0 - r.exponential(0.35, n), math.exp(-3.0 / 0.35)),
+        "a tenth meets anyone": (
+            lambda r, n: np.where(r.random(n) < 0.1, r.normal(1.5, 0.5, n), 9.0),
+            0.1 * sf.norm.cdf(-3.0),
+        ),
+        "never below 0.4 s": (lambda r, n: 0.4 + r.gamma(2.0, 0.8, n), 0.0),
+    }
+    for name, (draw, truth) in cases.items():
+        for rows in (500, 2000, 16_384):
+            found = [
+                of_near_misses(np.clip(draw(np.random.default_rng(seed), rows), 0.0, 4.0), seed)
+                for seed in range(repeats)
+            ]
+            known = [one for one in found if not one.doubt]
+            if not known:
+                print(f"| {name} | {rows} | {truth:.2g} | – | 0 % | – | – |")
+                continue
+            middle = np.median([one.estimate for one in known])
+            held = np.mean([one.low <= truth <= one.high for one in known])
+            below = np.mean([one.high < truth for one in known])
+            said = f"{middle:.2g} | {len(known) / repeats:.0%} | {held:.1%} | {below:.1%}"
+            print(f"| {name} | {rows} | {truth:.2g} | {said} |", flush=True)
 
 
 def coverage(repeats: int, budget: int, methods: list[str]) -> None:
@@ -309,6 +440,10 @@ def main() -> None:
     sure = parts.add_parser("known")
     sure.add_argument("--repeats", type=int, default=200)
     sure.add_argument("--budget", type=int, default=600)
+    sums = parts.add_parser("total")
+    sums.add_argument("--repeats", type=int, default=200)
+    sums.add_argument("--budget", type=int, default=30_000)
+    parts.add_parser("near-misses").add_argument("--repeats", type=int, default=200)
     other = parts.add_parser("scenarios")
     other.add_argument("folder", type=Path)
     other.add_argument("--pairs", nargs="*", default=[])
@@ -319,6 +454,10 @@ def main() -> None:
         rates(given.folder, given.pairs, given.seeds, given.budget)
     elif given.what == "known":
         known(given.repeats, given.budget)
+    elif given.what == "total":
+        total(given.repeats, given.budget)
+    elif given.what == "near-misses":
+        near_misses(given.repeats)
     else:
         scenarios(given.folder, given.pairs)
 

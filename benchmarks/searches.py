@@ -74,7 +74,7 @@ def found(folder: Path, space: SearchSpace, budgets: Sequence[int]) -> dict[int,
     at = np.flatnonzero(rows.critical)
     X = normalised(space, rows.X[at])
     new = distinct(X, n_var=space.n_var)
-    firsts = [int(at[k]) + 1 for k in modes_of(rows.findings.take(at)).values()]
+    firsts = [int(at[k[0]]) + 1 for k in modes_of(rows.findings.take(at)).values()]
     result = {}
     for budget in budgets:
         n = int(np.searchsorted(at, budget))

@@ -56,6 +56,7 @@ GIVEN = {
         "seeds": 2, "algorithm": "random", "keep": 0, "triage": "none", "quick": True,
     },
     "risk": {
+        "every": True,
         "scenario": "cut-in", "ego": "careful", "exposure": "uniform", "event": "conflict",
         "count": "any", "method": "mc", "precision": 0.125, "budget": 345, "seed": 7,
         "start": Path("runs/one"), "check": 12, "events": "events.csv", "vehicle": "single-track",

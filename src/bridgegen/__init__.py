@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from bridgegen.jobs.repair.repair import Repair, repair_driver
     from bridgegen.jobs.risk.result import Risk
     from bridgegen.jobs.risk.risk import estimate_risk
+    from bridgegen.jobs.risk.total import TotalRisk, estimate_total_risk
     from bridgegen.jobs.safety_case.export import export_safety_case
     from bridgegen.jobs.safety_case.model import SafetyCase
     from bridgegen.jobs.search import Run, resume, run_search
@@ -47,12 +48,14 @@ __all__ = [
     "SafetyCase",
     "SimulatorChoice",
     "SuiteRun",
+    "TotalRisk",
     "build_dashboard",
     "compare",
     "compare_drivers",
     "confirm",
     "errors",
     "estimate_risk",
+    "estimate_total_risk",
     "export_credibility",
     "export_safety_case",
     "exposure_of",
@@ -97,6 +100,8 @@ _HOMES = {
     "repair_driver": "bridgegen.jobs.repair.repair",
     "Risk": "bridgegen.jobs.risk.result",
     "estimate_risk": "bridgegen.jobs.risk.risk",
+    "TotalRisk": "bridgegen.jobs.risk.total",
+    "estimate_total_risk": "bridgegen.jobs.risk.total",
     "resume": "bridgegen.jobs.search",
     "run_search": "bridgegen.jobs.search",
     "export_credibility": "bridgegen.jobs.credibility.export",

@@ -1,6 +1,7 @@
 """Hand-worked measures of made-up runs."""
 
 import math
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ from bridgegen.jobs.compare.record import Record, modes_of
 INF = math.inf
 
 
-def record(reached: float, front: list[list[float]], *, critical=60, searched=("a",)) -> Record:
+def record(
+    reached: float, front: list[list[float]], *, critical=60, searched=("a",), modes="aaabc"
+) -> Record:
     x = np.array(front, np.float64).reshape(-1, 2)
     return Record(
         terms=("d_min", "v_d"), parameters=searched, command="", ended="budget",
@@ -22,7 +25,7 @@ def record(reached: float, front: list[list[float]], *, critical=60, searched=("
         seconds_reached={1: 0.1, 10: 0.2, 50: reached / 100.0}, distinct=5,
         distinct_reached={5: 30.0}, distinct_found=np.array([1, 5]), modes_reached={2: 7.0},
         critical_bins=7,
-        critical_pairs=9, modes=3, found=np.array([1, critical]), fronts=(x[:0], x),
+        critical_pairs=9, modes=Counter(modes), found=np.array([1, critical]), fronts=(x[:0], x),
         low=x.min(axis=0) if len(x) else None, high=x.max(axis=0) if len(x) else None,
     )  # fmt: skip
 
@@ -45,9 +48,18 @@ def test_by_hand():
     assert best["gd"] == 0.0
     assert best["modes"] == 3.0
     assert other["hypervolume"] == 0.0
+    assert math.isnan(best["covered"])  # the random run has the same seed
     # From (1, 1) to (½, 0) as to (0, ½).
     assert other["gd"] == pytest.approx(math.sqrt(1.25))
     assert other["spread"] == 1.0
+
+
+def test_what_is_covered_is_the_share_of_random_conflicts_that_were_found():
+    few, drawn = record(2.0, [[0.0, 0.0]], modes="ad"), record(2.0, [[0.0, 0.0]], modes="aaab")
+    records = {Cell("s", "pso", 0): few, Cell("s", "random", 1): drawn}
+    values = measure(records, 1000, "random").values
+    assert values[Cell("s", "pso", 0)]["covered"] == 0.75
+    assert math.isnan(values[Cell("s", "random", 1)]["covered"])
 
 
 def test_the_best_method_is_that_of_the_least_median():
@@ -104,5 +116,5 @@ def test_modes_are_different_conflicts_and_passing_by_is_none():
         rule=texts("signs", "signs", "signs", "", "signs"),
         partner=texts("bv", "bv", "bv", "", "bv"), implausible=none,
     )  # fmt: skip
-    assert list(modes_of(found).values()) == [0, 2, 4]
+    assert [rows[0] for rows in modes_of(found).values()] == [0, 2, 4]
     assert modes_of(Findings.none(4)) == {}

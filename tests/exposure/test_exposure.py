@@ -14,6 +14,7 @@ from tests.approval import approve, refuses
 
 from bridgegen.base.errors import BridgeGenError, InputError, ScenarioError
 from bridgegen.scenario.exposure import Encounters, example_names, exposure_of, read_exposure
+from bridgegen.scenario.exposure.dependence import Copula
 from bridgegen.scenario.exposure.exposure import poisson_interval
 from bridgegen.scenario.language.json_schema import schema
 from bridgegen.scenario.language.reader import load
@@ -119,6 +120,41 @@ def test_the_transform_is_undone_to_1e_10(exposure, z):
     assert np.abs(exposure.to_normal(X) - Z).max() <= 1e-10
     again = exposure.from_normal(exposure.to_normal(X))
     assert np.allclose(again, X, rtol=1e-12, atol=0.0)
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    z=st.lists(st.tuples(*[st.floats(-4.0, 4.0)] * 3), min_size=1, max_size=9),
+    freedom=st.floats(2.0, 1000.0),
+    order=st.permutations(range(3)),
+)
+def test_student_s_copula_is_undone_and_has_student_s_density(z, freedom, order):
+    """By SciPy's multivariate distribution; the third parameter is independent of both."""
+    names = tuple("abc"[k] for k in order)
+    rows = np.array([[1, -0.5, 0], [-0.5, 1, 0], [0, 0, 1]])[np.ix_(order, order)]
+    copula = Copula(names, tuple(map(tuple, rows.tolist())), freedom, ("b", "a"))
+    Z = np.array(z)
+    Y = copula.correlate(Z)
+    assume(np.abs(Y).max() <= 6.0)
+    assert np.abs(copula.whiten(Y) - Z).max() <= 1e-6
+    one = stats.t(freedom)
+    both = np.where(Y > 0.0, one.isf(stats.norm.sf(Y)), one.ppf(stats.norm.cdf(Y)))
+    both = both[:, [names.index("a"), names.index("b")]]
+    known = stats.multivariate_t(shape=[[1, -0.5], [-0.5, 1]], df=freedom).logpdf(both)
+    assert np.allclose(copula.log_density(Y), known - one.logpdf(both).sum(1), atol=1e-6)
+
+
+def test_student_s_copula_has_tails_of_its_own(folder):
+    """Both in their upper hundredth: λ of 4 degrees of freedom and 0.6 is 0.35 in the limit."""
+    shares = []
+    for freedom in ("", "  degrees_of_freedom: 4\n"):
+        found = read(folder, BLOCK.replace("encounters", f"{freedom}encounters"), "tails.yaml")
+        Z = np.random.default_rng(2).standard_normal((15_000, 3))
+        Y = found.copula.correlate(Z)[:, :2]
+        assert stats.kstest(Y[:, 1], "norm").pvalue > 1e-3
+        shares.append(float(np.mean(Y[Y[:, 0] > 2.33, 1] > 2.33)))
+    assert shares[1] > 1.5 * shares[0]
+    assert 0.28 < shares[1] < 0.55
 
 
 def test_rows_have_the_same_bits_in_any_batch(exposure):
@@ -233,6 +269,10 @@ WRONG = [
         "    - {between: [ego_speed, bv_speed], value: 0.9}\n"
         "    - {between: [ego_speed, bv_at], value: 0.9}\n"
         "    - {between: [bv_at, bv_speed], value: -0.9}", "must be positive definite", 5,
+    ),
+    (
+        "others: uniform\ndependence: {degrees_of_freedom: 4}",
+        "must be 2 to 1000, and stand with a correlation", 5,
     ),
     (
         "others: uniform\nencounters: {count: -1, hours: 3, source: s}",

@@ -1,6 +1,7 @@
 """Fits of planted events, and the files and errors of ``bridgegen fit``."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -59,6 +60,24 @@ def fit(scenario, events):
     )
 
 
+def test_a_fit_sees_that_parameters_are_extreme_together(scenario, planted):
+    copula = replace(planted.copula, freedom=3.0, tied=NAMES)
+    random = np.random.default_rng(5)
+    road = replace(planted, copula=copula)
+    X = road.from_normal(random.standard_normal((300, 3)))
+    found = fit_exposure(
+        scenario,
+        {name: X[:, planted.space.index(name)] for name in NAMES[:2]},
+        others="default",
+        replicates=20,
+    )
+    assert 2.0 <= found.freedom <= 5.0
+    assert found.exposure.copula.freedom == found.freedom
+    assert {item.copula.freedom for item in found.replicates} == {found.freedom}
+    assert found.exposure.copula.tied == NAMES[:2]
+    assert any("Student's copula with" in note for note in found.notes)
+
+
 def test_a_fit_finds_what_was_planted(fit, planted):
     """Within what 400 events tell: 0.068 is the band of their distribution function (95 %)."""
     for name, one in fit.parameters.items():
@@ -66,6 +85,7 @@ def test_a_fit_finds_what_was_planted(fit, planted):
         x = np.linspace(truth.low, truth.high, 301)
         assert np.abs(one.marginal.tails(x)[0] - truth.tails(x)[0]).max() < 0.05
     i, j, k = (fit.correlated.index(name) for name in NAMES)
+    assert fit.freedom is None
     assert fit.correlation[i, k] == pytest.approx(0.6, abs=0.12)
     assert fit.correlation[i, j] == pytest.approx(-0.3, abs=0.12)
     low, high = fit.correlation_band

@@ -81,7 +81,8 @@ Simulator = Annotated[
 Screen = Annotated[
     str | None,
     typer.Option(
-        help="Cheap simulator in which the algorithm searches for what the simulator evaluates.",
+        help="Cheap simulator (low fidelity) beside a slow one, in which the algorithm searches "
+        "for what the simulator evaluates; not with --rate.",
         show_default="none",
         rich_help_panel=SIMULATOR,
         autocompletion=completing("simulator"),

@@ -8,7 +8,7 @@ command that repeats it. Imports nothing slow: the command line needs it to star
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from math import inf
 from os import PathLike
@@ -42,7 +42,8 @@ def _named(value: Any) -> str:
     return str(Path(value).resolve()) if is_file else str(value)
 
 
-def _names(values: Any) -> tuple[Any, ...]:
+def as_names(values: Any) -> tuple[Any, ...]:
+    """Return several values, of which Python code may give one alone, or none."""
     return (values,) if isinstance(values, str | PathLike) else tuple(values or ())
 
 
@@ -56,19 +57,29 @@ SCENARIO = Form(str, words=lambda spelling, value: [spelling, _named(value)])
 SCENARIOS = Form(
     list[str],
     words=_repeated,
-    keep=_names,
+    keep=as_names,
     in_file=file_forms.TEXTS,
     valid=lambda values: all(isinstance(value, str | PathLike) for value in values),
     must="names or paths",
 )
 """Form of several scenarios; in Python one may stand alone."""
 
+EXPOSURES = replace(
+    SCENARIOS,
+    keep=lambda values: (
+        as_names(values) if isinstance(values, list | tuple) else as_names([values])
+    ),
+    valid=lambda values: None not in values,
+    must="names, paths or exposures",
+)
+"""Form of several exposures; in Python one may stand alone, and be an object."""
+
 PATHS = Form(
     list[Path],
     words=lambda spelling, paths: [
         word for path in paths for word in (spelling, str(path.resolve()))
     ],
-    keep=lambda paths: tuple(map(Path, _names(paths))),
+    keep=lambda paths: tuple(map(Path, as_names(paths))),
     in_file=file_forms.PATHS,
     valid=lambda paths: all(isinstance(item, Path) for item in paths),
     must="paths",
@@ -83,7 +94,7 @@ DRIVERS = Form(
         for name in ([text] if text.startswith("exec:") else read_names(text))
     ),
     words=_repeated,
-    keep=_names,
+    keep=as_names,
     in_file=file_forms.TEXTS,
     valid=lambda names: all(isinstance(item, str) for item in names),
     must="names",

@@ -36,6 +36,12 @@ DRIVERS = {
 }
 
 
+def test_types_say_only_what_differs_from_sumo():
+    plain = types_text(LENGTH, 1.9, {})
+    assert types_text(LENGTH, 1.9, {k: v[0] for k, v in sumo.EIDMDriver.tunable.items()}) == plain
+    assert ' jerkmax="5.0"' in types_text(LENGTH, 1.9, {"jerkmax": 5.0})
+
+
 # --- Ours: without the planner --------------------------------------------------------------------
 
 
@@ -177,6 +183,11 @@ def test_krauss_is_the_published_formula():
         assert expected > -4.5  # harder braking is SUMO's own rule
         found = driver.act(world.observe())
         assert float(found.acceleration[0]) == pytest.approx(expected, abs=1e-9)
+        driver.settings = {"tau": 1.4, "minGap": 4.0, "decel": 4.5}
+        driver.reset(1, scene(road_map((1,))))
+        expected = (krauss(v, gap - 4.0, leader, tau=1.4) - v) / DT
+        found = float(driver.act(world.observe()).acceleration[0])
+        assert found == pytest.approx(expected, abs=1e-9) or expected < -4.5
 
 
 @pytest.mark.planners
@@ -229,7 +240,7 @@ def test_a_vehicle_that_is_placed_drives_as_one_that_sumo_moves(model, tmp_path)
     of = scene(lanes)
     (tmp_path / "free.py").write_text(FREE)
     (tmp_path / "road.net.xml").write_text(network_text([StraightRoad(Corridor(lanes))]))
-    (tmp_path / "types.add.xml").write_text(types_text(of.length, of.width))
+    (tmp_path / "types.add.xml").write_text(types_text(of.length, of.width, {}))
     text = subprocess.run(
         [sys.executable, "free.py", "road.net.xml", "types.add.xml", model, "15.0"],
         cwd=tmp_path,

@@ -1,7 +1,7 @@
 """SUMO's one simulation of a process: vehicles are placed, it makes a step, the ego is asked."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,29 @@ MIN_GAP = 2.5
 EMERGENCY = 9.0
 """Largest deceleration of passenger cars [m/s²]; SUMO's ``emergencyDecel``."""
 
+Settings = Mapping[str, float]
+
+Numbers = dict[str, tuple[float | str, ...]]
+
+OF_ALL: Numbers = {
+    "tau": (1.0, 0.5, 3.0, "s"),
+    "minGap": (MIN_GAP, 1.0, 6.0, "m"),
+    "accel": (2.6, 1.0, 3.5, "m/s²"),
+    "decel": (4.5, 2.0, 6.0, "m/s²"),
+    "emergencyDecel": (EMERGENCY, 6.0, 9.0, "m/s²"),
+}
+"""The numbers of a vehicle type that may be set, by SUMO's names: its defaults for passenger cars,
+and ranges, which SUMO does not state: these are ours."""
+
+OF_EIDM: Numbers = {
+    "tpreview": (4.0, 1.0, 8.0, "s"),
+    "treaction": (0.5, 0.0, 1.5, "s"),
+    "ccoolness": (0.99, 0.0, 1.0),
+    "jerkmax": (3.0, 1.0, 10.0, "m/s³"),
+    "epsilonacc": (1.0, 0.5, 3.0, "m/s²"),
+}
+"""Those that EIDM has besides; not ``stepping``, which changes nothing in steps below 0.25 s."""
+
 
 class Simulation:
     """SUMO's one simulation of a process, with a road for each of N rows.
@@ -41,12 +64,15 @@ class Simulation:
         network: of all rows' roads.
         edges: how many each has.
         scene: of the batch.
+        settings: of the ego's type; what is left out has SUMO's default.
 
     Raises:
         InputError: the time step is no whole number of milliseconds.
     """
 
-    def __init__(self, model: str, network: str, edges: Sequence[int], scene: Scene) -> None:
+    def __init__(
+        self, model: str, network: str, edges: Sequence[int], scene: Scene, settings: Settings
+    ) -> None:
         import libsumo
 
         milliseconds = 1000.0 * scene.time_step
@@ -55,14 +81,14 @@ class Simulation:
                 "SUMO's time step must be a whole number of milliseconds, got "
                 f"{scene.time_step:g} s"
             )
-        self._sumo, self._scene = libsumo, scene
+        self._sumo, self._scene, self._settings = libsumo, scene, settings
         self._away: dict[str, bool] = {}
         self._lengths: dict[str, float] = {}
         self._last = [n - 1 for n in edges]
         with tempfile.TemporaryDirectory() as folder:
             net, types = Path(folder, "road.net.xml"), Path(folder, "types.add.xml")
             net.write_text(network)
-            types.write_text(types_text(scene.length, scene.width))
+            types.write_text(types_text(scene.length, scene.width, settings))
             options = [
                 *("-n", str(net), "-a", str(types), "--step-length", f"{scene.time_step:g}"),
                 # SUMO would take vehicles away that collide or wait for long; here they stay, as
@@ -127,13 +153,15 @@ class Simulation:
         # Having moved to the next edge within the step, its lane there says nothing of a change.
         if vehicle.getRoadID(ego) == f"r{r}e{int(seen.ego[0])}":
             wish = n - 1 - vehicle.getLaneIndex(ego)
-        least = max(now - EMERGENCY * self._scene.time_step, 0.0)
+        hardest = self._settings.get("emergencyDecel", EMERGENCY)
+        least = max(now - hardest * self._scene.time_step, 0.0)
         for lane, ahead in enumerate(seen.ahead.tolist()):
             gap, of, j = ahead[3:] if lane == goal else ahead[:3]
             if np.isfinite(gap):
                 # Without its name, CACC ignores the leader and keeps its speed.
                 other = f"r{r}o{int(j)}"
-                follow = vehicle.getFollowSpeed(ego, now, gap - MIN_GAP, of, DECELERATION, other)
+                free = gap - self._settings.get("minGap", MIN_GAP)
+                follow = vehicle.getFollowSpeed(ego, now, free, of, DECELERATION, other)
                 speed = min(speed, max(follow, least))
         if np.isfinite(seen.stop):
             speed = min(speed, max(vehicle.getStopSpeed(ego, now, seen.stop), least))
@@ -153,17 +181,20 @@ def _lane(r: int, edge: int, lane: int, lanes: Int) -> str:
     return f"r{r}e{edge}_{int(lanes[edge]) - 1 - lane}"
 
 
-def types_text(length: float, width: float) -> str:
+def types_text(length: float, width: float, settings: Settings) -> str:
     """Return the vehicle types, as the text of an additional file of SUMO.
 
     Args:
         length: of the ego [m].
         width: of the ego [m].
+        settings: of the ego's type.
     """
+    default = OF_ALL | OF_EIDM
+    of = "".join(f' {k}="{value!r}"' for k, value in settings.items() if value != default[k][0])
     errors = {"EIDM": ' sigmaleader="0" sigmagap="0" sigmaerror="0"'}
     egos = "".join(
         f'<vType id="{model}" carFollowModel="{model}" sigma="0" speedDev="0" '
-        f'length="{length!r}" width="{width!r}"{errors.get(model, "")}/>\n'
+        f'length="{length!r}" width="{width!r}"{errors.get(model, "")}{of}/>\n'
         for model in MODELS
     )
     return f'<additional>\n{egos}<vType id="other" sigma="0" speedDev="0"/>\n</additional>\n'

@@ -9,9 +9,9 @@ while it changes lane. So the model also follows what is ahead on the lane that 
 leaving, and bodies that reach into the ego's lane from another one or from beside the road. At a
 red light, and at a yellow one if it can, it is asked for its speed to stop.
 
-All settings are SUMO's own, but random numbers are off (``sigma``, ``speedDev`` and EIDM's errors
-are 0), so that a row depends on that row alone. What crosses the road is a vehicle on it only while
-it is there; oncoming ones stand.
+All settings are SUMO's own, unless others are given (``tunable``), but random numbers are off
+(``sigma``, ``speedDev`` and EIDM's errors are 0), so that a row depends on that row alone. What
+crosses the road is a vehicle on it only while it is there; oncoming ones stand.
 
 CACC needs a leader that is a CACC vehicle and sends its acceleration; no other participant is one.
 So it keeps its desired speed above a time gap of 2 s, follows by ACC's law (headway 1 s) below
@@ -33,9 +33,12 @@ EIDM; Milanés, Shladover, Transp. Res. C 48 (2014) 285, ACC and CACC; Erdmann, 
 
 from collections.abc import Sequence
 from importlib import import_module
+from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 
+from bridgegen.adapters.planners import _sumo_simulation as simulation
 from bridgegen.adapters.planners._corridor import Corridor
 from bridgegen.adapters.planners._sumo_road import Arrays, Eyes, Seen, StraightRoad, network_text
 from bridgegen.adapters.planners._sumo_script import SCRIPT
@@ -72,6 +75,8 @@ class SumoDriver:
     """
 
     wants = ("map",)
+    tunable: ClassVar = simulation.OF_ALL
+    settings: simulation.Settings = MappingProxyType({})
     model: str
 
     def __init__(self) -> None:
@@ -89,9 +94,8 @@ class SumoDriver:
         roads = [StraightRoad(Corridor(road)) for road in scene.maps]
         self._roads = [roads[k] for k in scene.map_of[:n]]
         self._eyes = [Eyes(road, scene) for road in self._roads]
-        self._simulation = Simulation(
-            self.model, network_text(self._roads), [len(item.lanes) for item in self._roads], scene
-        )
+        edges, network = [len(item.lanes) for item in self._roads], network_text(self._roads)
+        self._simulation = Simulation(self.model, network, edges, scene, self.settings)
         self._rows = [Row(road) for road in self._roads]
 
     def act(self, observation: Observation) -> Control:
@@ -122,6 +126,7 @@ class KraussDriver(SumoDriver):
 class EIDMDriver(SumoDriver):
     """Drives by SUMO's EIDM."""
 
+    tunable: ClassVar = simulation.OF_ALL | simulation.OF_EIDM
     model = "EIDM"
 
 
@@ -197,7 +202,7 @@ def export(observations: Sequence[Observation], scene: Scene) -> Arrays:
     seen = [eyes.see(observation, 0) for observation in observations]
     return {
         "network": np.array(network_text([road])),
-        "types": np.array(types_text(scene.length, scene.width)),
+        "types": np.array(types_text(scene.length, scene.width, {})),
         "route": np.array(" ".join(f"r0e{k}" for k in range(len(road.lanes)))),
         "time_step": np.array(scene.time_step),
         "lanes": road.lanes,

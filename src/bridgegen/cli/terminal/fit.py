@@ -75,6 +75,7 @@ def _plain(fit: "Fit", written: "Sequence[Path]") -> dict[str, object]:
         },
         "correlated": list(fit.correlated),
         "correlation": fit.correlation.tolist(),
+        "degrees_of_freedom": fit.freedom,
         "per_hour": _rate(encounters.per_hour if encounters else None),
         "per_km": _rate(encounters.per_km if encounters else None),
         "feasible_share": fit.exposure.feasible_share.estimate,

@@ -25,7 +25,7 @@ from bridgegen.jobs.search.exported import Facts, ParameterValue, Quantity, read
 from bridgegen.jobs.search.run import Run
 from bridgegen.scenario.language.criteria import PREFIX, read_criterion
 from bridgegen.search.triage.record import NOT_JUDGED
-from bridgegen.search.triage.words import mode_in_words
+from bridgegen.search.triage.words import covered_in_words, mode_in_words
 
 _CAUSES = {cause.label.replace(" ", "_"): cause.label for cause in CAUSES}
 """Labels of root causes by the figure's name."""
@@ -231,6 +231,8 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
     } | {key: f"{value:.6g}" for key, value in figures_of(run).items()}
     if run.triage is not None:
         facts |= {"found": run.triage.bound.sentence}
+        facts |= {"rate": run.triage.rate.sentence} if run.triage.rate else {}
+        facts |= {"covered": text} if (text := covered_in_words(run.triage)) else {}
         facts |= {f"mode {mode.number}": mode_in_words(mode, run.triage) for mode in run.modes}
     cases = [case_of(group, outcome) for outcome in outcomes]
     broken = [outcome for outcome in outcomes if outcome.verdict == "failed"]

@@ -362,7 +362,8 @@ class SearchOptions(CommonOptions):
         default=False,
         metadata=option(
             FLAG,
-            "Also estimate how likely harm and each failure mode is.",
+            "Also estimate how likely harm and each failure mode is; ends early when both the "
+            "interval and the modes suffice (--set precision).",
             before=False,
             group=SEARCH,
         ),
@@ -458,7 +459,8 @@ class SearchOptions(CommonOptions):
         default=None,
         metadata=option(
             SCREEN,
-            "Cheap simulator in which the algorithm searches for what the simulator evaluates.",
+            "Cheap simulator (low fidelity) beside a slow one, in which the algorithm searches "
+            "for what the simulator evaluates; not with --rate.",
             shown="none",
             before=None,
             group=OF_SIMULATOR,

@@ -124,7 +124,7 @@ def _conclude(
         except StorageError as error:
             gaps[cell] = str(error)
     measured = {
-        scenario: measure(of_it, plan.budget, plan.baseline, plan.apart)
+        scenario: measure(of_it, plan.budget, plan.baseline)
         for scenario in plan.scenarios
         if (of_it := {c: record for c, record in records.items() if c.scenario == scenario})
     }

@@ -9,9 +9,9 @@ import numpy as np
 from bridgegen.base.arrays import Float
 from bridgegen.base.statistics import quartiles
 from bridgegen.jobs.compare.fronts import Scale, front, generational_distance, hypervolume, spread
-from bridgegen.jobs.compare.options import APART
 from bridgegen.jobs.compare.plan import Cell
 from bridgegen.jobs.compare.record import DISTINCT, MODES, Record
+from bridgegen.search.triage.modes import of_found
 
 RANDOM = "random"
 """The algorithm whose scenarios are drawn from the space without regard to results."""
@@ -63,7 +63,7 @@ def measures(budget: int) -> tuple[Measure, ...]:
         Measure("distinct", "distinct", "different critical scenarios", True),
         Measure(
             "covered", "covered", "share of the critical scenarios of random search, with other "
-            "seeds, that differ from no critical one found", True, digits=3,
+            "seeds, whose conflict was found, too", True, digits=3,
         ),
         Measure("to_1", "to 1st", "evaluations until the 1st critical scenario", False),
         Measure(
@@ -143,9 +143,7 @@ def others(records: Mapping[Cell, Record], baseline: str) -> set[str]:
     return {cell.algorithm for cell, record in records.items() if record.parameters != usual}
 
 
-def measure(
-    records: Mapping[Cell, Record], budget: int, baseline: str, apart: float = APART
-) -> Measured:
+def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measured:
     """Measure the runs of one scenario, at least one.
 
     Bins and differences of parameters are not defined (NaN) for algorithms that search other
@@ -172,7 +170,7 @@ def measure(
             else float("nan"),
             "t_critic": relative[cell],
             **{f"to_{n}": count for n, count in record.reached.items()},
-            "modes": float(record.modes),
+            "modes": float(len(record.modes)),
             **{f"to_{n}_modes": count for n, count in record.modes_reached.items()},
             # Bins and distances of other parameters (an adversary's decisions) cannot be
             # compared.
@@ -181,9 +179,7 @@ def measure(
                 if cell.algorithm in strange
                 else _in_parameters(record)
             ),
-            "covered": float("nan")
-            if cell.algorithm in strange
-            else _covered(cell, records, apart),
+            "covered": _covered(cell, records),
             "hypervolume": float(curves[cell][-1]),
             "gd": generational_distance(final[cell], reference),
             "spread": spread(final[cell], reference),
@@ -196,26 +192,19 @@ def measure(
     return Measured(values, curves, scale, reference)
 
 
-def _covered(cell: Cell, records: Mapping[Cell, Record], apart: float) -> float:
-    """Return the share of critical random scenarios that lie near one that a run found.
+def _covered(cell: Cell, records: Mapping[Cell, Record]) -> float:
+    """Return the share of critical random scenarios whose conflict a run found: `of_found`.
 
     The random scenarios are those of random search with other seeds; NaN without any.
     """
-    from scipy.spatial import cKDTree
-
     drawn = [
-        record.points
+        mode
         for other, record in records.items()
         if other.algorithm == RANDOM and other.seed != cell.seed
+        for mode in record.modes.elements()
     ]
-    fresh, own = np.concatenate(drawn) if drawn else np.empty((0, 0)), records[cell]
-    if not fresh.size:
-        return float("nan")
-    if not own.points.size:
-        return 0.0
-    least = apart * np.sqrt(len(own.parameters))
-    off, _ = cKDTree(own.points).query(fresh, distance_upper_bound=least)
-    return float(np.mean(off < least))
+    known = of_found(records[cell].modes, drawn)
+    return known[0] / known[1] if known else float("nan")
 
 
 def _in_parameters(record: Record) -> dict[str, float]:

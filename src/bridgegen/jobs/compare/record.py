@@ -1,7 +1,8 @@
 """A compact record of one run for a comparison, however long the run is."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -117,8 +118,8 @@ class Record:
         distinct: how many different critical scenarios it found.
         distinct_reached: by k, the evaluations until the k-th different one; likewise.
         distinct_found: ``(c,)`` int64, different critical scenarios by the c points of its curve.
-        modes: how many different conflicts its critical scenarios have: type, responsible, rule,
-            partner.
+        modes: the different conflicts of its critical scenarios (type, responsible, rule,
+            partner), and how many have each.
         modes_reached: by k, the evaluations until the k-th different conflict; likewise.
         critical_bins: bins of parameters that hold a critical scenario.
         critical_pairs: pairs of bins of two parameters that do.
@@ -127,7 +128,6 @@ class Record:
             point.
         low: ``(m,)`` the least critical value of each term; None where every simulation failed.
         high: ``(m,)`` the most critical one; likewise.
-        points: ``(n, k)`` float64, the critical ones, see `normalised`; at most `LIMIT`.
     """
 
     terms: tuple[str, ...]
@@ -143,7 +143,7 @@ class Record:
     distinct: int
     distinct_reached: Mapping[int, float]
     distinct_found: Int
-    modes: int
+    modes: Counter[tuple[str, ...]]
     modes_reached: Mapping[int, float]
     critical_bins: int
     critical_pairs: int
@@ -151,7 +151,6 @@ class Record:
     fronts: tuple[Float, ...]
     low: Float | None
     high: Float | None
-    points: Float = field(default_factory=lambda: np.empty((0, 0)))
 
 
 MODE = ("conflict_type", "responsible", "rule", "partner")
@@ -220,8 +219,7 @@ def read(
     n = len(critical)
     # A greedy net in the run's own order. Single linkage forms chains: of 1,000 random rows of S4
     # it makes 8 clusters where the net counts 241.
-    where = normalised(space, critical)
-    is_new = distinct(where, apart, n_var=space.n_var)
+    is_new = distinct(normalised(space, critical), apart, n_var=space.n_var)
     new_at = [reader.hits[k][0] for k in np.flatnonzero(is_new).tolist()]
     bins = coverage(space, critical, np.ones(n, np.bool_), strength=2, sample=0).ways
     hits = reader.hits
@@ -238,12 +236,11 @@ def read(
         reached={k: float(hits[k - 1][0]) if k <= n else float("inf") for k in ks},
         seconds=seconds,
         seconds_reached={k: hits[k - 1][1] if k <= n else float("inf") for k in ks},
-        points=where[:LIMIT],
         distinct=len(new_at),
         distinct_reached={DISTINCT: _reached(new_at, DISTINCT)},
         distinct_found=np.searchsorted(new_at, points(budget), side="right").astype(np.int64),
-        modes=len(reader.modes),
-        modes_reached={MODES: _reached(list(reader.modes.values()), MODES)},
+        modes=reader.modes,
+        modes_reached={MODES: _reached(list(reader.modes_at.values()), MODES)},
         critical_bins=bins[0].critical,
         critical_pairs=bins[1].critical if len(bins) > 1 else 0,
         found=np.array(reader.found, np.int64),
@@ -258,17 +255,17 @@ def _reached(evaluations: Sequence[int], k: int) -> float:
     return float(evaluations[k - 1]) if k <= len(evaluations) else float("inf")
 
 
-def modes_of(findings: Findings) -> dict[tuple[str, ...], int]:
-    """Return the different conflicts of some rows, and the first row of each.
+def modes_of(findings: Findings) -> dict[tuple[str, ...], list[int]]:
+    """Return the different conflicts of some rows, and the rows of each, ascending.
 
     Conflicts differ in type, responsible, rule or partner. Rows without a near miss or a contact
     have none.
     """
     columns = findings.columns()
-    found: dict[tuple[str, ...], int] = {}
+    found: dict[tuple[str, ...], list[int]] = {}
     for row, key in enumerate(zip(*(columns[name].tolist() for name in MODE), strict=True)):
         if key[0]:
-            found.setdefault(key, row)
+            found.setdefault(key, []).append(row)
     return found
 
 
@@ -280,7 +277,8 @@ class _Reader:
         self.count = self.failed = 0
         self.hits: list[tuple[int, float]] = []
         self.critical: list[Float] = []
-        self.modes: dict[tuple[str, ...], int] = {}  # with the evaluations until the first of it
+        self.modes: Counter[tuple[str, ...]] = Counter()
+        self.modes_at: dict[tuple[str, ...], int] = {}  # the evaluations until the first of it
         self._front = np.empty((0, len(terms)))
         self.low: Float | None = None
         self.high: Float | None = None
@@ -307,8 +305,9 @@ class _Reader:
         before = len(self.hits)
         self.hits += zip(numbers, rows.seconds[at].tolist(), strict=True)
         self.critical.append(rows.X[at])
-        for mode, row in modes_of(rows.findings.take(at)).items():
-            self.modes.setdefault(mode, numbers[row])
+        for mode, found in modes_of(rows.findings.take(at)).items():
+            self.modes[mode] += len(found)
+            self.modes_at.setdefault(mode, numbers[found[0]])
         if ok.any():
             low, high = x[ok].min(axis=0), x[ok].max(axis=0)
             self.low = low if self.low is None else np.minimum(self.low, low)

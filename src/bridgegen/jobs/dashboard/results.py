@@ -254,7 +254,7 @@ class Result:
         worse_than: the driver that a difference is of, as people call it; else "".
         unjudged: whether it says nothing of the driver, see
             `bridgegen.search.triage.record.Bound.judged`.
-        covered: how many fresh random failures lie near one that was found, and of how many; None
+        covered: how many fresh random failures are of a mode that was found, and of how many; None
             where it is not known.
     """
 

@@ -28,7 +28,7 @@ class RepairOptions(ScenariosOptions):
         metadata=option(
             WHOLE,
             "Evenly spread variations of each scenario without a matrix that the repair does not "
-            "see, on which both drivers are compared.",
+            "see, on which both drivers are compared; as many random ones check settings before.",
             spelling="--held-out",
             limits=(1, MAX_SAMPLES),
             group=SEARCH,
@@ -69,7 +69,6 @@ JOB = Job(
         "changed": "tunable numbers that are set anew",
         "failures": "failing scenarios that searches and random draws found, of all rounds",
         "mended": "of them, those that pass with the new settings",
-        "new": "of the others, those that pass without the settings",
         "structure": "those that none of the settings that were tried mends",
         "traded": "those that other settings mend, which break more or mend fewer",
         "late": "those of the last search, for which no settings were sought",
@@ -77,6 +76,7 @@ JOB = Job(
         "modes_gone": "of them, those of which every recorded example passes",
         "broken": "held-out variations that pass without the settings, and fail with them",
         "fixed": "held-out variations that fail without them, and pass with them",
+        "broken_robustly": "of the broken ones, those of which most neighbours fail with them, too",
         "both_fail": "held-out variations that fail with both",
         "fails_upper": "with 95 % confidence, at most this share of held-out variations fails",
         "jerk": "mean jerk with the settings / without",

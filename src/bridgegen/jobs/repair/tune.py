@@ -1,4 +1,8 @@
-"""Settings that mend failures: trials of them on rows, and CMA-ES over the tunable numbers.
+"""Settings that mend failures: CMA-ES over the tunable numbers, then a check on many rows.
+
+Settings are tried on few rows: those that fail, and guards, which must still pass. The best are
+checked on many more. What they break there become guards, and the next best are checked
+(counterexample-guided, as programs are synthesised).
 
 Source: Abdessalem et al. (ARIEL), ISSTA 2020, doi:10.1145/3395363.3397386, for repair by search
 with what passes as a constraint; CMA-ES: Hansen (2016), arXiv:1604.00772.
@@ -6,6 +10,7 @@ with what passes as a constraint; CMA-ES: Hansen (2016), arXiv:1604.00772.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +23,11 @@ from bridgegen.drivers.tunable import Settings, Tunable
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Lost, Threads
 from bridgegen.search.algorithms.cma_es import reflected
+from bridgegen.search.triage.moves import around
+from bridgegen.search.triage.neighbours import NEIGHBOURS, RADIUS, ROBUST
+
+if TYPE_CHECKING:
+    from cmaes import CMA
 
 HARM, CHANGE, BROKEN = 0.5, 0.1, 10.0
 """Weights in the cost of settings, beside the share of rows that they do not mend: of the mean harm
@@ -34,6 +44,13 @@ DIGITS = 4
 
 STALLED = 3
 """Generations without better settings after which the search ends once all rows are mended."""
+
+FIXED, TESTED, CHECKED = 10, 16, 8
+"""Rows that settings must fix for each one that they break; broken rows of which neighbours are
+driven at most; settings that are checked in a round at most."""
+
+FIRST, FACTOR = 128, 4
+"""Rows that a check drives first, and times as many in each further step."""
 
 FAILS, PASSES, WORST, CHANGES, TIME, WAY = range(6)
 """Columns of what a driver makes of a row: whether it fails or passes (neither without a result, or
@@ -77,6 +94,13 @@ class Rows:
     def __add__(self, other: "Rows") -> "Rows":
         return Rows((*self.X, *other.X), np.concatenate([self.scene, other.scene]))
 
+    def at(self, index: Int) -> "Rows":
+        """Return some of them."""
+        return Rows(tuple(self.X[i] for i in index.tolist()), self.scene[index])
+
+
+NONE = Rows((), np.zeros(0, np.int64))
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -84,29 +108,26 @@ class Trial:
 
     Attributes:
         values: of the tunable numbers, in their order.
-        failed: ``(F, 6)``, what becomes of the rows that have failed; see `FAILS`.
-        is_feasible: whether all that has passed does not fail, and jerk and time are in bounds.
+        mends: ``(F,)`` bool, which of the rows that have failed pass.
+        is_feasible: whether all that has passed does not fail, and jerk and time are in bounds;
+            False where that was not driven, as the cost says enough.
         cost: less is better.
-        jerk: mean, / that without settings.
-        travel_time: per distance, / that without settings.
     """
 
     values: tuple[float, ...]
-    failed: Float
+    mends: Bool
     is_feasible: bool
     cost: float
-    jerk: float
-    travel_time: float
-
-    @property
-    def mends(self) -> Bool:
-        """``(F,)`` bool, which of the rows pass."""
-        return np.asarray(self.failed[:, PASSES] > 0.0)
 
     @property
     def rank(self) -> tuple[bool, float]:
         """Less is better; what is not feasible is never better."""
         return not self.is_feasible, self.cost
+
+
+def supported(fixed: int, broken: int, robust: int) -> bool:
+    """Return whether rows support settings: none is broken robustly, and far more are fixed."""
+    return not robust and FIXED * broken <= fixed
 
 
 class Bench:
@@ -116,16 +137,43 @@ class Bench:
         pipelines: of the scenarios.
         tunable: the driver's numbers.
         base: what they are now.
+        seed: of neighbours.
+
+    Attributes:
+        failing: rows that settings are to mend; the job adds to them.
+        manners: mean jerk and travel time of settings that were checked, / those without.
     """
 
     def __init__(
-        self, pipelines: Sequence[Pipeline], tunable: tuple[Tunable, ...], base: tuple[float, ...]
+        self,
+        pipelines: Sequence[Pipeline],
+        tunable: tuple[Tunable, ...],
+        base: tuple[float, ...],
+        seed: int = 0,
     ) -> None:
-        self.pipelines, self.tunable, self.base = pipelines, tunable, base
-        self.failing = Rows((), np.zeros(0, np.int64))
-        self.never = np.zeros(0, np.bool_)  # those that no settings mend that were tried
-        self.tried, self._known = 0, dict[tuple[float, ...], Trial]()
+        self.pipelines, self.tunable, self.base, self.seed = pipelines, tunable, base, seed
+        self.failing, self.guards, self.drawn = NONE, NONE, NONE
+        self._base = np.zeros((0, 6))  # of drawn rows
+        self._mannered = self._sought = 0
+        self.manners = dict[tuple[float, ...], Float]()
+        self._refuted = set[tuple[float, ...]]()
+        # What is known of rows that failed, and of guards: the first ones of each, by settings.
+        self._failed = dict[tuple[float, ...], Float]()
+        self._passed = dict[tuple[float, ...], Float]()
         self._workers = Threads()
+
+    @property
+    def tried(self) -> int:
+        """How many settings were tried."""
+        return len(self._failed)
+
+    @property
+    def never(self) -> Bool:
+        """``(F,)``, rows that no settings mend that were tried on them."""
+        found = np.ones(len(self.failing.X), np.bool_)
+        for driven in self._failed.values():
+            found[: len(driven)] &= driven[:, PASSES] == 0.0
+        return found
 
     def drive(self, rows: Rows, values: tuple[float, ...]) -> Float:
         """Drive rows; return what becomes of each, ``(N, 6)``."""
@@ -135,53 +183,58 @@ class Bench:
             at = np.flatnonzero(rows.scene == scene)
             X, pipeline = np.stack([rows.X[i] for i in at]), self.pipelines[scene]
             parts = self._workers.map(pipeline, drive, X, settings)
-            none = [np.zeros((part.rows, 6)) for part in parts]
+            lost = [isinstance(part.result, Lost) for part in parts]
+            each = zip(parts, lost, strict=True)
             found[at] = np.concatenate(
-                [
-                    a if isinstance(p.result, Lost) else p.result
-                    for p, a in zip(parts, none, strict=True)
-                ]
+                [np.zeros((p.rows, 6)) if no else p.result for p, no in each]
             )
         return found
 
-    def guard(self, drawn: Rows, found: Rows) -> Rows:
-        """Keep the rows that pass; return random ones that fail, which are to be mended, too.
+    def draw(self, drawn: Rows) -> None:
+        """Take random rows: settings, their jerk and travel time are checked on them."""
+        self.drawn, self._base = drawn, self.drive(drawn, self.base)
 
-        Args:
-            drawn: random rows, by which jerk and travel time are measured.
-            found: rows of a search.
-        """
-        rows = drawn + found
-        driven = self.drive(rows, self.base)
-        passes, fails = (np.flatnonzero(driven[:, k]) for k in (PASSES, FAILS))
-        self._passed = Rows(tuple(rows.X[i] for i in passes), rows.scene[passes])
-        self._drawn = passes < len(drawn.X)
-        self._manner = _manner(driven[passes[self._drawn]])
-        fails = fails[fails < len(drawn.X)]
-        return Rows(tuple(rows.X[i] for i in fails), rows.scene[fails])
+    def drawn_that(self, column: int, most: int) -> Rows:
+        """Return the first drawn rows of each scenario that pass or fail."""
+        that, scene = self._base[:, column] > 0.0, self.drawn.scene
+        at = [np.flatnonzero(that & (scene == k))[:most] for k in range(len(self.pipelines))]
+        return self.drawn.at(np.concatenate(at))
 
-    def add(self, failing: Rows) -> None:
-        """Add rows that fail; nothing has been tried on them."""
-        self.failing += failing
-        self.never = np.concatenate([self.never, np.ones(len(failing.X), np.bool_)])
-        self._known.clear()
+    def guard(self, drawn: Rows, found: Rows = NONE) -> None:
+        """Add rows that must still pass: drawn ones, and those of others that pass."""
+        driven = self.drive(found, self.base)
+        if not self.guards.X:
+            self._mannered = len(drawn.X)  # of the guards the first, by which manner is measured
+        self.guards += drawn + found.at(np.flatnonzero(driven[:, PASSES]))
 
-    def trial(self, values: tuple[float, ...]) -> Trial:
-        """Try settings; those that were tried before are not simulated again."""
-        if values not in self._known:
-            # Together: a driver in Python drives a thousand rows in little more time than one.
-            both = self.drive(self.failing + self._passed, values)
-            failed, passed = np.split(both, [len(self.failing.X)])
-            manner = _manner(passed[self._drawn]) / self._manner
-            wrong = passed[:, FAILS].sum() / max(1, len(passed))
-            wrong += np.maximum(0.0, manner - 1.0 - WITHIN).sum()
-            change = np.abs(self.unit(values) - self.unit(self.base)).mean()
-            cost = 1.0 - failed[:, PASSES].mean() + HARM * failed[:, WORST].mean()
-            cost += CHANGE * change + BROKEN * wrong
-            found = Trial(values, failed, not wrong, float(cost), *manner.tolist())
-            self._known[values], self.tried = found, self.tried + 1
-            self.never &= ~found.mends
-        return self._known[values]
+    def _known(
+        self, of: dict[tuple[float, ...], Float], rows: Rows, values: tuple[float, ...]
+    ) -> Float:
+        known = of.get(values, np.zeros((0, 6)))
+        if len(known) < len(rows.X):
+            more = self.drive(rows.at(np.arange(len(known), len(rows.X))), values)
+            of[values] = known = np.concatenate([known, more])
+        return known
+
+    def trial(self, values: tuple[float, ...], limit: float = np.inf) -> Trial:
+        """Try settings, on guards only below a cost; what was driven is not driven again."""
+        failed = self._known(self._failed, self.failing, values)
+        mends, cost = failed[:, PASSES] > 0.0, self._cost(values, failed)
+        if cost >= limit:
+            return Trial(values, mends, False, cost)
+        passed = self._known(self._passed, self.guards, values)
+        wrong = passed[:, FAILS].sum() / max(1, len(passed))
+        before = self._known(self._passed, self.guards, self.base)
+        manner = _manner(passed[: self._mannered]) / _manner(before[: self._mannered])
+        wrong += np.maximum(0.0, manner - 1.0 - WITHIN).sum()
+        is_feasible = not wrong and values not in self._refuted
+        return Trial(values, mends, is_feasible, float(cost + BROKEN * wrong))
+
+    def _cost(self, values: tuple[float, ...], failed: Float) -> float:
+        """Return the cost of failures and of the change."""
+        change = np.abs(self.unit(values) - self.unit(self.base)).mean()
+        left, harm = 1.0 - failed[:, PASSES].mean(), failed[:, WORST].mean()
+        return float(left + HARM * harm + CHANGE * change)
 
     def unit(self, values: Sequence[float]) -> Float:
         """Return values as shares of their ranges."""
@@ -199,7 +252,8 @@ class Bench:
         """Return the best settings that keep the constraints; the present ones if none are better.
 
         First the least and the greatest value of each number alone; then CMA-ES from the best on;
-        then numbers are put back that mend nothing.
+        then numbers are put back that mend nothing. The best are checked (see `choose`); where
+        that refutes some, CMA-ES begins again with half as many tries.
 
         Args:
             start: settings of an earlier round.
@@ -208,35 +262,114 @@ class Bench:
         """
         from cmaes import CMA  # loads a part of SciPy
 
-        base, n = self.base, len(self.tunable)
+        base, self._sought = self.base, len(self.failing.X)
         ends = [
             (*base[:k], end, *base[k + 1 :])
             for k, item in enumerate(self.tunable)
             for end in (item.low, item.high)
         ]
-        first = [self.trial(values) for values in [base, start, *ends][:tries]]
-        best = min(first, key=lambda trial: trial.rank)
-        # Of one number CMA has no covariance: a second one, which stands for nothing, gives it one.
-        mean = np.append(self.unit(best.values), [0.5] * (n == 1))
+        first = [base, start, *ends][:tries]
+        best = self.trial(base)
+        for values in first[1:]:
+            best = min(best, self.trial(values, best.cost), key=lambda trial: trial.rank)
+        left, refuted = tries - len(first), -1
         random = np.random.Generator(np.random.PCG64(seed))
-        search = CMA(mean, STEP, seed=int(random.integers(2**32)))
-        left, stalled = tries - len(first), 0
+        while left > 0 and refuted < len(self._refuted):
+            refuted = len(self._refuted)
+            # Of one number CMA has no covariance: a second one, of no meaning, gives it one.
+            mean = np.append(self.unit(best.values), [0.5] * (len(self.tunable) == 1))
+            self._search(CMA(mean, STEP, seed=int(random.integers(2**32))), best, left)
+            best, left = self.choose(), left // 2  # what was refuted is infeasible now
+        return best
+
+    def _search(self, search: "CMA", best: Trial, left: int) -> None:
+        """Try settings by CMA-ES, then the best with numbers as they were."""
+        n, stalled = len(self.tunable), 0
         while left >= search.population_size and not search.should_stop():
             drawn = [search.ask() for _ in range(search.population_size)]
-            trials = [self.trial(self._rounded(reflected(row[:n]))) for row in drawn]
+            before, limit = best, best.cost
+            trials = [self.trial(self._rounded(reflected(row[:n])), limit) for row in drawn]
             search.tell([(row, trial.cost) for row, trial in zip(drawn, trials, strict=True)])
-            left, before = left - len(drawn), best
+            left -= len(drawn)
             best = min([best, *trials], key=lambda trial: trial.rank)
             stalled = stalled + 1 if best is before else 0
             if stalled >= STALLED and best.mends.all():
                 break
-        for k in np.argsort(
-            np.abs(self.unit(best.values) - self.unit(base)), kind="stable"
-        ).tolist():
-            trial = self.trial((*best.values[:k], base[k], *best.values[k + 1 :]))
-            if trial.is_feasible and trial.mends.sum() >= best.mends.sum():
-                best = trial
+        self._put_back(best)
+
+    def _put_back(self, best: Trial) -> Trial:
+        """Try each number of settings as it was, the least changed first."""
+        shares = np.abs(self.unit(best.values) - self.unit(self.base))
+        for k in np.argsort(shares, kind="stable").tolist():
+            trial = self.trial((*best.values[:k], self.base[k], *best.values[k + 1 :]), -1.0)
+            if trial.mends.sum() >= best.mends.sum():
+                trial = self.trial(trial.values)
+                best = trial if trial.is_feasible else best
         return best
+
+    def choose(self) -> Trial:
+        """Return the best settings that were tried and that a check supports; else the present."""
+        base, left, n = self.trial(self.base), CHECKED, self._sought
+        # By the cost of failures alone, which is known of all; guards are driven where they decide.
+        costs = {
+            values: self._cost(values, failed[:n])
+            for values, failed in self._failed.items()
+            if len(failed) >= n
+        }
+        for values in sorted(costs, key=lambda values: costs[values]):
+            if not left:
+                break
+            trial = self.trial(values, base.cost)
+            if trial.rank >= base.rank:
+                continue
+            put_back = self._put_back(trial)
+            if self._check(put_back.values):
+                return self.trial(put_back.values)
+            left -= 1
+        return base
+
+    def _check(self, values: tuple[float, ...]) -> bool:
+        """Return whether drawn rows support settings; else what they break become guards."""
+        if values in self.manners or values in self._refuted or values == self.base:
+            return values not in self._refuted
+        n, size, driven = len(self.drawn.X), FIRST, np.zeros((0, 6))
+        fails, is_well = int((self._base[:, FAILS] > 0.0).sum()), True
+        while is_well and len(driven) < n:
+            part = self.drawn.at(np.arange(len(driven), min(n, size)))
+            driven = np.concatenate([driven, self.drive(part, values)])
+            before, size = self._base[: len(driven)], size * FACTOR
+            fixes, breaks = changes(before, driven)
+            broken = self.drawn.at(np.flatnonzero(breaks))
+            unfixed = (before[:, FAILS] > 0.0) & ~fixes
+            is_well = supported(fails - int(unfixed.sum()), len(broken.X), 0)
+        if is_well and n:
+            is_well = not self.robust(broken, values).any()
+        if not is_well:
+            self.guards += broken.at(np.arange(min(len(broken.X), TESTED)))
+        else:
+            passes = self._base[:, PASSES] > 0.0
+            self.manners[values] = _manner(driven[passes]) / _manner(self._base[passes])
+            is_well = bool((self.manners[values] <= 1.0 + WITHIN).all())
+        if not is_well:
+            self._refuted.add(values)
+        return is_well
+
+    def robust(self, broken: Rows, values: tuple[float, ...]) -> Bool:
+        """Return which of the first broken rows fail robustly: most of their neighbours, too."""
+        some = broken.at(np.arange(min(len(broken.X), TESTED)))
+        near = [
+            around(self.pipelines[k].space, x, self.seed, i, NEIGHBOURS, RADIUS)[0]
+            for i, (x, k) in enumerate(zip(some.X, some.scene.tolist(), strict=True))
+        ]
+        rows = Rows(tuple(x for X in near for x in X), np.repeat(some.scene, NEIGHBOURS))
+        fails = self.drive(rows, values)[:, FAILS].reshape(-1, NEIGHBOURS)
+        return np.asarray(fails.mean(axis=1) >= ROBUST)
+
+
+def changes(before: Float, after: Float) -> tuple[Bool, Bool]:
+    """Return which rows are fixed, and which are broken."""
+    fixes = (before[:, FAILS] > 0.0) & (after[:, PASSES] > 0.0)
+    return fixes, (before[:, PASSES] > 0.0) & (after[:, FAILS] > 0.0)
 
 
 def _manner(driven: Float) -> Float:

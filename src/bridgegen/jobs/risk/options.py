@@ -1,12 +1,20 @@
 """What a risk can be asked, and the figures that it states."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bridgegen.engine.options.forms import ANOTHER_SIMULATOR, NUMBER, PATH, TEXT, WHOLE
-from bridgegen.engine.options.option import DRIVER, OUTPUT, SIMULATOR, option
-from bridgegen.jobs.frame import ANY, OF_SCENARIO, DriveOptions, Job, SimulatingOptions
+from bridgegen.engine.options.forms import ANOTHER_SIMULATOR, FLAG, NUMBER, PATH, TEXT, WHOLE
+from bridgegen.engine.options.option import DRIVER, OUTPUT, SIMULATOR, WHAT, option
+from bridgegen.jobs.frame import (
+    ANY,
+    EXPOSURES,
+    SCENARIOS,
+    DriveOptions,
+    Job,
+    SimulatingOptions,
+)
 
 if TYPE_CHECKING:
     from bridgegen.scenario.exposure import Exposure
@@ -25,7 +33,27 @@ WORDS = {
 class RiskOptions(DriveOptions, SimulatingOptions):
     """The options of ``estimate_risk``."""
 
-    scenario: str | Path = field(kw_only=False, metadata=OF_SCENARIO)
+    scenario: str | Path | Sequence[str | Path] = field(
+        default=(),
+        kw_only=False,
+        metadata=option(
+            SCENARIOS,
+            "A name of the catalogue or of a pack, or a YAML file; several, or a folder: their "
+            "rates are added.",
+            names="suite",
+            group=WHAT,
+            is_argument=True,
+        ),
+    )
+    every: bool = field(
+        default=False,
+        metadata=option(
+            FLAG,
+            "Add the rates of all scenarios of the catalogue.",
+            spelling="--catalogue",
+            group=WHAT,
+        ),
+    )
     ego: str | None = field(
         default=None,
         metadata=option(
@@ -36,12 +64,13 @@ class RiskOptions(DriveOptions, SimulatingOptions):
             names="driver",
         ),
     )
-    exposure: "str | Path | Exposure | None" = field(
-        default=None,
+    exposure: "str | Path | Exposure | Sequence[str | Path | Exposure]" = field(
+        default=(),
         metadata=option(
-            ANY,
+            EXPOSURES,
             "How its parameters are distributed: a file (.yaml), an example of 'bridgegen list "
             "exposures', or uniform.",
+            hint="May be repeated: one for each scenario.",
             shown="the exposure in the scenario's file",
         ),
     )
@@ -71,8 +100,8 @@ class RiskOptions(DriveOptions, SimulatingOptions):
         default=200_000,
         metadata=option(
             WHOLE,
-            "Maximum number of simulations of the estimate; a tenth more search for the most "
-            "likely harmful ones.",
+            "Maximum number of simulations of the estimate, of all scenarios; a tenth more search "
+            "for the most likely harmful ones.",
         ),
     )
     seed: int = field(default=0, metadata=option(WHOLE, "Seed of the random number generator."))
@@ -121,7 +150,7 @@ class RiskOptions(DriveOptions, SimulatingOptions):
         metadata=option(
             PATH,
             "The risk's folder; a stopped estimate is resumed.",
-            shown="risk/SCENARIO",
+            shown="risk/SCENARIO, risk/total",
             group=OUTPUT,
         ),
     )
@@ -136,6 +165,11 @@ FIGURES = {
     },
     **{f"{name}_per_hour": f"{words}, per hour" for name, words in WORDS.items()},
     **{f"{name}_per_km": f"{words}, per km" for name, words in WORDS.items()},
+    **{
+        f"{name}_per_{unit}_upper": f"{words}, per {unit}: it is below this, with 95 % confidence"
+        for name, words in WORDS.items()
+        for unit in ("hour", "km")
+    },
     "evaluations": "simulations",
 }
 """The figures of a risk that ``--fail-if`` accepts."""
@@ -143,11 +177,12 @@ FIGURES = {
 JOB = Job(
     name="risk",
     options=RiskOptions,
-    function="bridgegen.jobs.risk.risk:estimate_risk",
+    function="bridgegen.jobs.risk.total:estimate_any_risk",
     help="""Estimate how likely harm is per encounter, with an interval.
 
-    And per hour and kilometre, where the exposure says how often the scenario is met. Writes a
-    record, a page, the harmful rows, and the most likely one of each failure mode as a scenario.
+    And per hour and kilometre, where the exposure says how often the scenario is met; of several
+    scenarios, the sum. Writes a record, a page, the harmful rows, and the most likely one of each
+    failure mode as a scenario.
     """,
     figures=FIGURES,
     example="collision_upper > 1e-4",

@@ -8,7 +8,8 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.assess.conflict.analysis import encounters
+from bridgegen.assess.conflict._limits import HORIZON
+from bridgegen.assess.conflict.analysis import COURSE, encounters
 from bridgegen.assess.conflict.findings import Findings
 from bridgegen.assess.conflict.harm import NEAR_MISS, Count, closeness_of_pairs, decisive
 from bridgegen.assess.conflict.plausibility import Implausible, plausibility
@@ -38,6 +39,9 @@ class Column(IntEnum):
     """Status of the row: 1; 0 where the simulation failed; −1 where the traffic is implausible."""
     MODE = 4
     """Number of the failure mode among `Outcomes.modes`; −1 of a harmless row."""
+    TTC = 5
+    """Shortest time to collision [s] of the row's collision courses, of near misses and collisions
+    of those that count; 0 in a collision, `HORIZON` without any."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class Outcomes:
     def lost(cls, n: int) -> "Outcomes":
         """Return those of N rows without a result."""
         values = np.zeros((n, len(Column)))
-        values[:, Column.MODE] = -1.0
+        values[:, Column.MODE], values[:, Column.TTC] = -1.0, HORIZON
         return cls(values, ())
 
 
@@ -82,14 +86,13 @@ def outcomes(pipeline: Pipeline, X: Float, count: Count) -> Outcomes:
         X: ``(N, len(space.names))`` feasible rows.
         count: whose conflicts count.
     """
-    values = np.zeros((len(X), len(Column)))
+    values = Outcomes.lost(len(X)).values
     words = np.full(len(X), "", dtype=object)
     for at, runner in pipeline.runner.by_variant(X):
         values[at], words[at] = _outcomes(runner, X[at], count)
     harmful = values[:, Column.SCORE] >= NEAR_MISS
     modes = dict.fromkeys(words[harmful])
     numbers = {mode: number for number, mode in enumerate(modes)}
-    values[:, Column.MODE] = -1.0
     values[harmful, Column.MODE] = [numbers[mode] for mode in words[harmful]]
     return Outcomes(values, tuple(modes))
 
@@ -103,7 +106,7 @@ def _outcomes(runner: Runner, X: Float, count: Count) -> tuple[Float, npt.NDArra
         closeness_of_pairs(conflicts, of).max(axis=1) for of in (count, "ego", "any")
     )
     rows = np.arange(len(X))
-    values = np.zeros((len(X), len(Column)))
+    values = Outcomes.lost(len(X)).values
     # Neither a failed row nor one whose traffic could not happen counts as an event.
     ok = (rollout.status == 0) & (gate.code == Implausible.NONE)
     # Harm alone is 0 where the ego is not responsible: levels that followed it ended in front of
@@ -111,6 +114,11 @@ def _outcomes(runner: Runner, X: Float, count: Count) -> tuple[Float, npt.NDArra
     led = np.where(score >= NEAR_MISS, score, ALMOST * np.minimum(near, NEAR_MISS))
     values[ok, Column.SCORE], values[ok, Column.OWN] = led[ok], own[ok]
     values[ok, Column.SEVERITY] = conflicts.severity[rows, other][ok]
+    meets = (conflicts.kind == COURSE) | conflicts.at_fault | (count == "any")
+    meets[:, 0] = False
+    values[ok, Column.TTC] = np.where(meets, conflicts.ttc, HORIZON).min(axis=1, initial=HORIZON)[
+        ok
+    ]
     values[:, Column.RESULT] = np.where(rollout.status != 0, 0.0, np.where(ok, 1.0, -1.0))
     found = Findings.of(conflicts, gate.labels, count)
     words = found.conflict_type + ", " + found.rule + ", with " + found.partner

@@ -2,22 +2,27 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.units import percent
 from bridgegen.jobs.risk.estimators.weighted import Probability
 from bridgegen.jobs.risk.options import WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS
-from bridgegen.jobs.risk.result import Finding, ParameterShare, Risk
+from bridgegen.jobs.risk.result import PAGE, Finding, ParameterShare, Risk
 from bridgegen.jobs.risk.text import (
     crashes,
     data_sentence,
     elsewhere_sentence,
+    extreme_sentence,
     interval,
     sentence,
 )
 from bridgegen.pages import charts, templates
-from bridgegen.pages.templates import Banner, number, odds
+from bridgegen.pages.templates import Banner, Cell, counted, number, odds
+
+if TYPE_CHECKING:
+    from bridgegen.jobs.risk.total import TotalRisk
 
 MOST_DRAWN = 6
 """Largest number of failure modes in the picture of all intervals; the table has all."""
@@ -50,6 +55,34 @@ def write_page(path: Path, risk: Risk) -> None:
         ],
         unsure=[*unsure(risk)],
         command=risk.command,
+    )
+
+
+def write_total(path: Path, total: "TotalRisk") -> None:
+    """Write the page of a sum over scenarios.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
+    head, rows = total.rows()
+    drawn = [
+        charts.Interval(name, "event", p.low, p.estimate, p.high)
+        for name, *_ in rows
+        if (p := total.risks[name].probability(total.event)) and p.estimate > 0.0
+    ]
+    linked = [[Cell(row[0], href=f"scenarios/{row[0]}/{PAGE}"), *row[1:]] for row in rows]
+    templates.write_page(
+        path,
+        "jobs/risk/total.html",
+        title="Risk of several scenarios",
+        facts=[f"driver {total.driver}", total.work, counted(len(total.risks), "scenario")],
+        verdict=Banner(total.sentence),
+        advice=total.advice,
+        picture=charts.intervals(drawn, "Probabilities per encounter, 95 %") if drawn else "",
+        head=head,
+        rows=linked,
+        near_misses=[*total.near_misses()],
+        command=total.command,
     )
 
 
@@ -101,6 +134,8 @@ def unsure(risk: Risk) -> Iterator[str]:
             "Harm to which no gradient leads is not found by this method, "
             "however much of it there is; mc assumes nothing."
         )
+    if risk.extreme is not None:
+        yield extreme_sentence(risk.extreme, risk.probability("collision"))
     if risk.data is not None:
         yield data_sentence(risk.data)
     else:

@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 from collections.abc import Mapping
 from csv import writer
 from dataclasses import dataclass
@@ -16,8 +15,10 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.risk.cross_simulator import Elsewhere
+from bridgegen.jobs.risk.estimators.total import DRAWS
 from bridgegen.jobs.risk.estimators.weighted import FEWEST_HITS, Probability, Weighted
 from bridgegen.jobs.risk.experiment import Estimated
+from bridgegen.jobs.risk.extremes import Extreme, of_near_misses
 from bridgegen.jobs.risk.options import FIGURES, WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS, INJURY, Column, DataBand
 from bridgegen.scenario.exposure import Exposure
@@ -175,8 +176,6 @@ class Risk:
     def rate(self, name: str, unit: str) -> Rate | None:
         """Return how often an event happens per hour or km; None where that is not known.
 
-        The intervals of both factors are combined as if their logarithms were independent.
-
         Args:
             name: of the event.
             unit: "h" or "km".
@@ -185,15 +184,7 @@ class Risk:
         each = None if met is None else met.per_hour if unit == "h" else met.per_km
         if each is None or p is None:
             return None
-        estimate = each.estimate * p.estimate
-        # An end of 0 has no logarithm; the upper ends multiply, which holds in any case.
-        if not (estimate > 0.0 and each.low > 0.0 and p.low > 0.0):
-            return Rate(estimate, 0.0, each.high * p.high)
-        # Both factors are positive and skewed: their logarithms add, and so do the squares of the
-        # distances.
-        low = math.hypot(math.log(each.estimate / each.low), math.log(p.estimate / p.low))
-        high = math.hypot(math.log(each.high / each.estimate), math.log(p.high / p.estimate))
-        return Rate(estimate, estimate * math.exp(-low), estimate * math.exp(high))
+        return each.of_which(p.estimate, p.low, p.high)
 
     @cached_property
     def parameters(self) -> tuple[ParameterShare, ...]:
@@ -210,6 +201,16 @@ class Risk:
             if name in self.exposure.marginals
         ]
         return tuple(sorted(found, key=lambda share: -share.distance))
+
+    def draws(self, name: str, random: np.random.Generator) -> tuple[Float, ...]:
+        """Return draws of an event's probability, see `Weighted.draws`."""
+        return self.weighted.draws(self._values(name), random, DRAWS)
+
+    @cached_property
+    def extreme(self) -> Extreme | None:
+        """How likely a collision is by near misses; None if no row was drawn as on the road."""
+        road = self.weighted.road
+        return of_near_misses(road[:, Column.TTC], self.seed) if road.size else None
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``risk.json`` says."""
@@ -258,6 +259,7 @@ class Risk:
                 for likely in self.most_likely
             ],
             "diagnostics": weighted.facts,
+            "near_misses": None if self.extreme is None else self.extreme.to_dict(),
             "check": None
             if self.check is None
             else {
@@ -294,6 +296,7 @@ class Risk:
             for unit, words in (("h", "hour"), ("km", "km")):
                 rate = self.rate(name, unit)
                 found[f"{name}_per_{words}"] = nan if rate is None else rate.estimate
+                found[f"{name}_per_{words}_upper"] = nan if rate is None else rate.high
         name, method = self.exposure.scenario.name, self.estimated.method
         return (
             Judged(
@@ -359,6 +362,8 @@ class Risk:
 
     def _finding(self, values: Float) -> Finding:
         hits, weighted = self.weighted.hits(values), self.weighted
+        if self.failed >= weighted.evaluations:
+            return Finding(None, hits, f"none of {self.failed:,} simulations has a result")
         if weighted.doubts:  # of the aim; what comes with it is no surer
             return Finding(None, hits, weighted.doubts[0])
         counted = bool(weighted.rows) and (

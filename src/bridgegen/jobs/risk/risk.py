@@ -3,10 +3,10 @@
 import hashlib
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -20,15 +20,15 @@ from bridgegen.base.errors import InputError, Interrupted, StorageError, Unknown
 from bridgegen.drivers.identity import digest_of
 from bridgegen.engine.options import PipelineOptions, called_with
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.engine.workers import open_workers
-from bridgegen.jobs.frame import command_of, require_ranges
+from bridgegen.engine.workers import Workers, open_workers
+from bridgegen.jobs.frame import as_names, command_of, require_ranges
 from bridgegen.jobs.risk import experiment as methods
 from bridgegen.jobs.risk.cross_simulator import HERE, kept_elsewhere, look_elsewhere
 from bridgegen.jobs.risk.estimators import exploration as design_point
 from bridgegen.jobs.risk.estimators import monte_carlo
 from bridgegen.jobs.risk.estimators.problem import Aim, block_of
 from bridgegen.jobs.risk.estimators.weighted import Weighted
-from bridgegen.jobs.risk.experiment import Experiment
+from bridgegen.jobs.risk.experiment import Estimated, Experiment
 from bridgegen.jobs.risk.ledger import MOST_LIKELY, Ledger
 from bridgegen.jobs.risk.options import RiskOptions
 from bridgegen.jobs.risk.outcomes import LEAST, Column, data_band
@@ -169,9 +169,21 @@ def estimate_risk(given: RiskOptions) -> Risk:
         StorageError: the folder holds something else, or cannot be written.
         Interrupted: Ctrl-C; what is done is kept.
     """
-    aimed = require_event(given.event)
+    require(given)
+    with open_workers(given.workers) as hands:
+        asked = prepare(given, hands)
+        return finish(asked, Path("risk", asked.scenario.name))
+
+
+def require(given: RiskOptions) -> None:
+    """Check what does not depend on the scenario.
+
+    Raises:
+        InputError: an option is out of its range, or unknown.
+    """
+    require_event(given.event)
     methods.require(given.method)
-    whose = _count(given.count)
+    _count(given.count)
     require_ranges(
         given,
         {
@@ -182,21 +194,97 @@ def estimate_risk(given: RiskOptions) -> Risk:
             "seed": (0, math.inf),
         },
     )
-    elsewhere = given.simulator
-    if elsewhere is not None and elsewhere.name == EMBEDDED.name:
+    if given.simulator is not None and given.simulator.name == EMBEDDED.name:
         raise InputError(
             f"the risk is that in the simulator {EMBEDDED.name}; compare it with another one "
             "(--simulator)"
         )
     if given.ego is not None:
         egos.get(given.ego)
-    logical = load(given.scenario)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A scenario whose risk is estimated.
+
+    Attributes:
+        given: the options.
+        scenario: driven and bounded as was asked for.
+        exposure: how its parameters are distributed.
+        fit: to the events that the exposure was fitted to, if they are given.
+        points: of the event that a search found, if there are.
+        pipeline: of the driver.
+        hands: that simulate.
+    """
+
+    given: RiskOptions
+    scenario: LogicalScenario
+    exposure: Exposure
+    fit: Fit | None
+    points: Float | None
+    pipeline: Pipeline
+    hands: Workers
+
+    def settings(self, given: RiskOptions) -> dict[str, Any]:
+        """Return what the batches of an estimate depend on, and nothing else."""
+        # Workers, for one, may change between two calls.
+        name, scenario, Z = self.pipeline.driver.name, self.scenario, self.points
+        return {
+            "version": version("bridgegen"),
+            "scenario": scenario.name,
+            "fingerprint": scenario.fingerprint,
+            "exposure": _digest(self.exposure),
+            "driver": name,
+            "file of the driver": digest_of(name) or None,
+            "vehicle": self.pipeline.runner.vehicle,
+            "event": given.event,
+            "count": given.count,
+            "method": given.method,
+            "precision": given.precision,
+            "budget": given.budget,
+            "seed": given.seed,
+            "check": given.check,
+            "start": None if Z is None else hashlib.sha256(Z.tobytes()).hexdigest(),
+            "events": None if self.fit is None else self.fit.used,
+            **({} if scenario.odd is None else {"odd": scenario.odd.odd.to_record()}),
+        }
+
+    def experiment(self, given: RiskOptions, folder: Path, total: int) -> Experiment:
+        """Return the experiment of an estimate, whose batches are kept in a folder."""
+        ledger, say = Ledger(folder, self.settings(given)), given.callbacks
+        whose = _count(given.count)
+        return Experiment(
+            self.pipeline, self.exposure, self.hands, whose, ledger,
+            lambda done: say.progress("simulations", done, total, ""),
+        )  # fmt: skip
+
+    def estimate(self, given: RiskOptions, experiment: Experiment) -> Estimated:
+        """Return what an experiment says by the method that was asked for."""
+        aim = Aim(require_event(given.event).score, LEAST, given.budget, given.precision)
+        return methods.estimate(given.method, experiment, aim, given.seed, self.points)
+
+
+def prepare(given: RiskOptions, hands: Workers) -> Asked:
+    """Read a scenario and its exposure.
+
+    Raises:
+        InputError: not one scenario, or no exposure of it.
+    """
+    if len(names := as_names(given.scenario)) != 1:
+        raise InputError(
+            f"one scenario has a risk, got {len(names)}; of several: estimate_total_risk"
+            if names
+            else "missing: SCENARIO, or --catalogue for all that ship"
+        )
+    logical = load(names[0])
     if not isinstance(logical, LogicalScenario):
         raise InputError(
-            f"a risk is that of a logical scenario (.yaml) with an exposure, got {given.scenario}"
+            f"a risk is that of a logical scenario (.yaml) with an exposure, got {names[0]}"
         )
     driven = cast(LogicalScenario, within(driven_by(logical, given.others), given.odd))
-    met = _exposure(driven, given.exposure)
+    if len(exposures := as_names(given.exposure)) > 1:
+        raise InputError(f"one scenario has one exposure (--exposure), got {len(exposures)}")
+    met = _exposure(driven, exposures[0] if exposures else None)
     if driven.odd is not None:
         # Hours and kilometres count encounters outside the ODD, too, of which nothing is simulated.
         met = replace(met, encounters=None)
@@ -213,98 +301,88 @@ def estimate_risk(given: RiskOptions) -> Risk:
             f"the exposure of {driven.name} distributes no parameter: nothing is random"
         )
     fitted = _fit_of(driven, met, given.events)
-    folder = Path("risk", driven.name) if given.out is None else Path(given.out)
+    options = PipelineOptions(ego=given.ego, vehicle=given.vehicle)
+    pipeline = Pipeline(driven, met.space, options, workers=hands)
+    Z = None if given.start is None else _points_of(Path(given.start), met, given.event)
+    return Asked(given, driven, met, fitted, Z, pipeline, hands)
+
+
+def finish(asked: Asked, default: Path, road: Float | None = None) -> Risk:
+    """Estimate the risk of a scenario, and write it.
+
+    Args:
+        asked: the scenario.
+        default: the folder, if none was given.
+        road: ``(n, len(Column))`` further outcomes of rows as on the road, for near misses.
+    """
+    given, met, pipeline, hands = asked.given, asked.exposure, asked.pipeline, asked.hands
+    folder = default if given.out is None else Path(given.out)
+    elsewhere, score = given.simulator, require_event(given.event).score
     budget, check, seed, say = given.budget, given.check, given.seed, given.callbacks
-    with open_workers(given.workers) as hands:
+    whose = _count(given.count)
+    there = None
+    if elsewhere is not None:
         options = PipelineOptions(ego=given.ego, vehicle=given.vehicle)
-        pipeline = Pipeline(driven, met.space, options, workers=hands)
-        name, vehicle = pipeline.driver.name, pipeline.runner.vehicle
-        Z = None if given.start is None else _points_of(Path(given.start), met, given.event)
-        settings = {
-            "version": version("bridgegen"),
-            "scenario": driven.name,
-            "fingerprint": driven.fingerprint,
-            # What the batches depend on, and nothing else: workers, for one, may change between two
-            # calls.
-            "exposure": _digest(met),
-            "driver": name,
-            "file of the driver": digest_of(name) or None,
-            "vehicle": vehicle,
-            "event": given.event,
-            "count": given.count,
-            "method": given.method,
-            "precision": given.precision,
-            "budget": budget,
-            "seed": seed,
-            "check": check,
-            "start": None if Z is None else hashlib.sha256(Z.tobytes()).hexdigest(),
-            "events": None if fitted is None else fitted.used,
-            **({} if driven.odd is None else {"odd": driven.odd.odd.to_record()}),
-        }
-        there = None
-        if elsewhere is not None:
-            there = Pipeline(driven, met.space, options, simulator=elsewhere, workers=hands)
-        is_object = isinstance(given.exposure, Exposure)
-        command = command_of(
-            "risk",
-            given,
-            folder,
-            ego=name,
-            vehicle=vehicle,
-            exposure="EXPOSURE" if is_object else given.exposure,
-            simulator_rows=given.simulator_rows if elsewhere else None,
-        )
-        ledger = Ledger(folder, settings)
-        say.compile()
-        pipeline.warm_up()
-        total = budget + check + (HERE if there else 0)
-        experiment = Experiment(
-            pipeline,
-            met,
-            hands,
-            whose,
-            ledger,
-            lambda done: say.progress("simulations", done, total, ""),
-        )
-        try:
-            aim = Aim(aimed.score, LEAST, budget, given.precision)
-            found = methods.estimate(given.method, experiment, aim, seed, Z)
-            failed, implausible = experiment.failed, experiment.implausible
-            beside = None
-            if check:
-                plain = Aim(aimed.score, LEAST, check, 0.0)
-                # Another seed, so that the second estimate shares no row with the first.
-                beside = monte_carlo.estimate(experiment, plain, seed + OTHER_ROWS)
-            # Looked for, since the likeliest row that the estimate happens to draw had a density
-            # too low by factors of 50 to 3,000 in ten dimensions.
-            likely = find_most_likely(experiment, met, found.weighted, aimed.score, budget, seed)
-            other = None
-            if there is not None and elsewhere is not None:
-                rows = given.simulator_rows
-                kept = kept_elsewhere(folder, elsewhere, settings)
-                beyond = Experiment(
-                    there,
-                    met,
-                    hands,
-                    whose,
-                    kept,
-                    lambda done: say.progress("elsewhere", done, rows, ""),
-                )
-                other = look_elsewhere(
-                    experiment, beyond, elsewhere.name, found.weighted, aimed.score, rows, seed
-                )
-        except KeyboardInterrupt:
-            raise Interrupted(folder, experiment.evaluations, total, command=command) from None
-        data = None
-        if fitted is not None and not found.weighted.doubts:
-            data = data_band(met, found.weighted, aimed.score, fitted)
-        shown = write_most_likely(pipeline, likely, whose, folder)
+        there = Pipeline(asked.scenario, met.space, options, simulator=elsewhere, workers=hands)
+    command = command_of(
+        "risk",
+        given,
+        folder,
+        ego=pipeline.driver.name,
+        vehicle=pipeline.runner.vehicle,
+        exposure=named_exposures(given),
+        simulator_rows=given.simulator_rows if elsewhere else None,
+    )
+    total = budget + check + (HERE if there else 0)
+    experiment = asked.experiment(given, folder, total)
+    say.compile()
+    pipeline.warm_up()
+    try:
+        found = asked.estimate(given, experiment)
+        failed, implausible = experiment.failed, experiment.implausible
+        beside = None
+        if check:
+            plain = Aim(score, LEAST, check, 0.0)
+            # Another seed, so that the second estimate shares no row with the first.
+            beside = monte_carlo.estimate(experiment, plain, seed + OTHER_ROWS)
+        # Looked for, since the likeliest row that the estimate happens to draw had a density
+        # too low by factors of 50 to 3,000 in ten dimensions.
+        likely = find_most_likely(experiment, met, found.weighted, score, budget, seed)
+        other = None
+        if there is not None and elsewhere is not None:
+            rows = given.simulator_rows
+            kept = kept_elsewhere(folder, elsewhere, asked.settings(given))
+            beyond = Experiment(
+                there,
+                met,
+                hands,
+                whose,
+                kept,
+                lambda done: say.progress("elsewhere", done, rows, ""),
+            )
+            other = look_elsewhere(
+                experiment, beyond, elsewhere.name, found.weighted, score, rows, seed
+            )
+    except KeyboardInterrupt:
+        raise Interrupted(folder, experiment.evaluations, total, command=command) from None
+    data = None
+    if asked.fit is not None and not found.weighted.doubts:
+        data = data_band(met, found.weighted, score, asked.fit)
+    if road is not None and road.size:
+        rows_ = [part for part in (road, found.weighted.road) if part.size]
+        found = replace(found, weighted=replace(found.weighted, road=np.concatenate(rows_)))
+    shown = write_most_likely(pipeline, likely, whose, folder)
     result = Risk(
         met, pipeline.driver.label, given.event, given.count, found, seed, budget,
         tuple(experiment.modes), failed, implausible, beside, data, other, shown, command, folder,
     )  # fmt: skip
     result.write()
     return result
+
+
+def named_exposures(given: RiskOptions) -> list[Any]:
+    """Return exposures as a command names them."""
+    return ["EXPOSURE" if isinstance(x, Exposure) else x for x in as_names(given.exposure)]
 
 
 def _count(name: str) -> Count:

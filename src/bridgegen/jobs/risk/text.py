@@ -5,7 +5,9 @@ from collections.abc import Iterator
 from bridgegen.base.units import percent
 from bridgegen.jobs.frame import Table
 from bridgegen.jobs.risk.cross_simulator import Elsewhere, Ratio
+from bridgegen.jobs.risk.estimators.total import Total
 from bridgegen.jobs.risk.estimators.weighted import Probability
+from bridgegen.jobs.risk.extremes import Extreme
 from bridgegen.jobs.risk.options import WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS, DataBand
 from bridgegen.jobs.risk.result import PAGE, Risk
@@ -20,21 +22,26 @@ def sentence(risk: Risk) -> str:
 
 
 def _sentence(risk: Risk) -> str:
-    p, what = risk.probability(risk.event), WORDS[risk.event]
-    if risk.count == "ego":
-        what = f"{what} that the ego is responsible for or could have prevented"
+    p, what_ = risk.probability(risk.event), what(risk.event, risk.count)
     if p is None:
         reason = risk.findings[risk.event].doubt
-        return f"How likely {what} is, is not known: {reason}. {_advice(risk)}."
+        return f"How likely {what_} is, is not known: {reason}. {_advice(risk)}."
     if p.estimate == 0.0:
         return (
-            f"Of {risk.weighted.rows:,} encounters none was {what}: with 95 % confidence the "
+            f"Of {risk.weighted.rows:,} encounters none was {what_}: with 95 % confidence the "
             f"probability is below {number(p.upper)} per encounter (rule of three)."
         )
     return (
-        f"The probability of {what} is {number(p.estimate)} per encounter (95 %: {number(p.low)} "
+        f"The probability of {what_} is {number(p.estimate)} per encounter (95 %: {number(p.low)} "
         f"to {number(p.high)})."
     )
+
+
+def what(event: str, count: str) -> str:
+    """Return an event in words, with which conflicts count."""
+    if count == "any":
+        return WORDS[event]
+    return f"{WORDS[event]} that the ego is responsible for or could have prevented"
 
 
 def lines(risk: Risk) -> Iterator[str | Table]:
@@ -57,6 +64,9 @@ def lines(risk: Risk) -> Iterator[str | Table]:
     if risk.check is not None:
         value, width, _ = interval(risk.check.probability(EVENTS[risk.event].score))
         yield f"{'check':<12}{value} ({width}) in {risk.check.evaluations:,} by mc"
+    if risk.extreme is not None:
+        found = risk.findings["collision"].probability
+        yield f"{'near misses':<12}{extreme_sentence(risk.extreme, found)}"
     if risk.data is not None:
         yield f"{'data':<12}{data_sentence(risk.data)}"
     for crash in crashes(risk):
@@ -99,6 +109,34 @@ def data_sentence(band: DataBand) -> str:
     return (
         f"Few data: with exposures of resampled events the estimate is {number(band.low)} to "
         f"{number(band.high)} (95 % of {band.exposures})."
+    )
+
+
+def extreme_sentence(found: Extreme, p: Probability | None) -> str:
+    """Return how likely collisions are by near misses, and whether that agrees, in a sentence."""
+    if found.doubt:
+        return f"Near misses do not say how likely collisions are: {found.doubt}."
+    return near_misses(found, p)
+
+
+def near_misses(
+    found: Extreme | Total, p: Probability | Total | None, per: str = "encounter", size: float = 1.0
+) -> str:
+    """Return how often collisions happen by near misses, and whether that agrees, in a sentence."""
+    low, middle, high = (number(size * end) for end in (found.low, found.estimate, found.high))
+    if p is None:
+        agrees = "the simulations do not say how often"
+    elif found.high < p.low or p.high < found.low:
+        many = "more" if found.high < p.low else "fewer"
+        agrees = f"that disagrees with the simulations, by which there are {many}"
+    else:
+        agrees = "that agrees with the simulations"
+    often = f"happens {middle} times per {per} (bootstrap, 95 %: {low} to {high})"
+    if found.high == 0.0:
+        often = "does not happen: all extremes stop short of it"
+    return (
+        "By near misses alone (extreme values of the time to collision, extrapolated) a collision "
+        f"{often}; {agrees}."
     )
 
 

@@ -46,6 +46,7 @@ from bridgegen.jobs.search.scenarios import (
 from bridgegen.jobs.search.screening import BATCH, require_screen, screen_budget
 from bridgegen.jobs.search.searcher import (
     FailingDriver,
+    Suffices,
     drawn_of,
     require_asynchronous,
     searcher_of,
@@ -63,6 +64,7 @@ from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenar
 from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Problem, resolve
 from bridgegen.search.algorithms.automatic import AUTO, RATE, automatic
+from bridgegen.search.algorithms.rate import Rate
 from bridgegen.search.triage.effort import effort
 from bridgegen.search.triage.fresh import failing_draws
 from bridgegen.search.triage.record import JSON_FILE, Repeated, read_record, write_record
@@ -321,13 +323,18 @@ def _go(
 ) -> Run:
     """Search up to the budget; then export and report, if ``deliver``."""
     callbacks.stage("search")
-    on_batch = callbacks.batch
+    watching = [callbacks.batch]
     if pipeline.driver.is_own:
         failing = FailingDriver(store, pipeline.driver.name, settings.budget)
+        watching.append(failing.after_batch)
+    enough = None
+    if isinstance(algorithm, Rate):
+        enough = Suffices(algorithm, pipeline.runner.kinds)
+        watching.append(enough.after_batch)
 
-        def on_batch(progress: Progress) -> None:
-            callbacks.batch(progress)
-            failing.after_batch(progress)
+    def on_batch(progress: Progress) -> None:
+        for watch in watching:
+            watch(progress)
 
     try:
         evaluating = pipeline.stream() if settings.ahead else nullcontext(pipeline.evaluate)
@@ -340,6 +347,7 @@ def _go(
                 settings.budget,
                 on_batch,
                 ahead=settings.ahead or 0,
+                enough=enough,
             )
     except WorkersError as error:
         raise _workers_lost(error, store) from error
@@ -471,7 +479,10 @@ def _with_algorithm(
         given = replace(given, algorithm=RATE)
     if given.algorithm == RATE:
         if given.screen is not None:
-            raise InputError("--rate draws rows of the simulator itself: leave out --screen")
+            raise InputError(
+                "--rate needs the chance of each row, which is not known of rows that a screen "
+                "proposes: leave out --screen"
+            )
         return replace(given, rate=True)
     if given.algorithm != AUTO:
         return given

@@ -26,18 +26,19 @@ PATIENCE = 100
 
 
 class Reason(StrEnum):
-    """Why a loop ended. The first three finish the run; after the others it can be resumed."""
+    """Why a loop ended. The first four finish the run; after the others it can be resumed."""
 
     BUDGET = "budget"
     CONVERGED = "converged"
     EXHAUSTED = "exhausted"
+    ENOUGH = "enough"
     STOPPED = "stopped"
     INTERRUPTED = "interrupted"
 
     @property
     def final(self) -> bool:
         """Whether the run is finished, its budget unchanged."""
-        return self in (Reason.BUDGET, Reason.CONVERGED, Reason.EXHAUSTED)
+        return self not in (Reason.STOPPED, Reason.INTERRUPTED)
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,7 @@ def run_loop(
     stop: Callable[[], bool] | None = None,
     *,
     ahead: int = 0,
+    enough: Callable[[], bool] | None = None,
 ) -> LoopResult:
     """Search until the budget is spent: exactly ``budget`` evaluations, never one more.
 
@@ -152,6 +154,8 @@ def run_loop(
         stop: called before each batch; True ends the loop.
         ahead: rows whose results the algorithm need not have when it is asked for a batch, ≥ 0;
             0 unless it is `asynchronous`.
+        enough: called after each batch that is not a replay of recorded ones; True finishes the
+            run. It depends on the recorded rows alone.
 
     Returns:
         The end of the loop. Ctrl-C ends it, too; finished batches are in the store by then.
@@ -170,6 +174,8 @@ def run_loop(
             session.restore()
         while reason is None:
             reason = Reason.STOPPED if stop is not None and stop() else session.batch()
+            if reason is None and enough is not None and session.is_up_to_date and enough():
+                reason = Reason.ENOUGH
         if reason.final and store.finished != reason:
             store.finish(reason)
     except KeyboardInterrupt:
@@ -255,6 +261,11 @@ class _Session:
         running = 0.0 if self._began is None else time.perf_counter() - self._began
         return self._seconds_before + running
 
+    @property
+    def is_up_to_date(self) -> bool:
+        """Whether all recorded rows have been asked for."""
+        return len(self._known) >= self._recorded
+
     def restore(self) -> None:
         """Restore the algorithm's saved state, if there is one; later rows are replayed."""
         algorithm, saved = self._algorithm, self._store.checkpoint()
@@ -279,7 +290,7 @@ class _Session:
 
     def batch(self) -> Reason | None:
         """Do one batch; return the reason if it was the last one."""
-        if len(self._known) >= self._recorded:
+        if self.is_up_to_date:
             self._start_clock()
         U = self._ask()
         if len(U) == 0:
@@ -334,7 +345,7 @@ class _Session:
         self._algorithm.tell(told.U, self._log.results(told.ids))
         # With `--ahead` a state would have to hold the rows in flight, too: none is saved, and a
         # search that resumes replays.
-        if not last and not self._ahead and len(self._known) >= self._recorded:
+        if not last and not self._ahead and self.is_up_to_date:
             self._save()
 
     def keep_notes(self) -> None:
@@ -399,7 +410,7 @@ class _Session:
             )
 
     def _nothing_new(self, reason: Reason) -> Reason:
-        if len(self._known) < self._recorded:
+        if not self.is_up_to_date:
             raise self._other(f"the search ends after {len(self._known)} evaluations ({reason})")
         return reason
 

@@ -1,7 +1,8 @@
 """What searches in a campaign: the algorithm, alone or in a screen; and what ends it early."""
 
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -10,19 +11,21 @@ from bridgegen.base.errors import InputError
 from bridgegen.engine.options import SearchOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.jobs.search.known_rows import KnownRows, ResultLog
-from bridgegen.jobs.search.loop import Progress
+from bridgegen.jobs.search.loop import Progress, Reason
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.screening import Screen, screen_of
 from bridgegen.jobs.search.settings import Settings
 from bridgegen.results.store import Store
 from bridgegen.scenario.exposure import Exposure
+from bridgegen.scenario.exposure import Rate as OfExposure
 from bridgegen.scenario.exposure.reader import chosen_exposure
 from bridgegen.scenario.exposure.road import OnRoad
 from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Arena, Problem, asynchronous, resolve
 from bridgegen.search.algorithms.rate import Rate
 from bridgegen.search.screened import Screened
-from bridgegen.search.triage.rates import Drawn
+from bridgegen.search.triage.modes import Key, keys_of
+from bridgegen.search.triage.rates import Drawn, how_likely
 from bridgegen.simulation.rollout import FAILURES, STATUS_MESSAGES
 
 
@@ -103,8 +106,21 @@ def drawn_of(
     last = int(over[0]) if len(over) else len(ids)
     met = _met(pipeline, settings)
     road = OnRoad(met, pipeline.space).share if met else (1.0, 1.0, 1.0)
-    source = met.source if met else ""
-    return Drawn(algorithm.draws.take(last), ids[:last], road, source)
+    amounts: dict[Literal["hour", "1,000 km"], OfExposure] = {}
+    # Hours and kilometres count encounters outside the ODD, too, of which nothing is simulated.
+    if met and met.encounters and settings.odd is None:
+        if (per_hour := met.encounters.per_hour) is not None:
+            amounts["hour"] = per_hour
+        if (per_km := met.encounters.per_km) is not None:
+            amounts["1,000 km"] = per_km.of_which(1000.0, 1000.0, 1000.0)
+    return Drawn(
+        algorithm.draws.take(last),
+        ids[:last],
+        road,
+        met.source if met else "",
+        amounts,
+        settings.budget - n if store.finished == Reason.ENOUGH else 0,
+    )
 
 
 def _met(pipeline: Pipeline, settings: Settings) -> Exposure | None:
@@ -130,6 +146,45 @@ def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
     problem = _problem(pipeline, arena, _met(pipeline, settings))
     values = resolve(method, problem, settings.seed, settings.settings)
     return method(problem, settings.seed, **values)
+
+
+LEAST_RATED, QUIET = 300, 0.25
+"""Number of evaluations before which no search with rates ends, unless its budget does; and the
+share of them, the last ones, in which there was no new failure mode."""
+
+
+class Suffices:
+    """Whether a search with rates may end: its interval is narrow, and no failure mode is new.
+
+    Args:
+        algorithm: that searches.
+        kinds: of the participants, by name.
+    """
+
+    def __init__(self, algorithm: Rate, kinds: Mapping[str, str]) -> None:
+        self._algorithm, self._kinds = algorithm, kinds
+        self._modes, self._rows, self._at_last = set[Key](), 0, 0
+
+    def after_batch(self, progress: Progress) -> None:
+        """Note the failure modes of a batch, recorded or replayed."""
+        self._rows, result = progress.evaluations, progress.result
+        if result.findings is not None:
+            found = result.findings.take(np.flatnonzero(result.critical))
+            blank = [""] * len(found.conflict)
+            keys = keys_of(found, self._kinds, blank, blank)
+            if not self._modes.issuperset(keys):
+                self._modes.update(keys)
+                self._at_last = self._rows
+
+    def __call__(self) -> bool:
+        """Return whether the rows so far suffice, by the algorithm's settings."""
+        ran, values = self._algorithm, self._algorithm.values
+        if self._rows < LEAST_RATED or self._rows - self._at_last < QUIET * self._rows:
+            return False
+        n = len(ran.draws.U)
+        found = how_likely(Drawn(ran.draws, np.arange(n), ran.road.share, ""), ran.critical)
+        width = found.high - found.low
+        return bool(found.estimate) and width <= 2.0 * values["precision"] * (found.estimate or 0.0)
 
 
 # --- A search ends early if the user's driver fails in every scenario: there is nothing to find ---

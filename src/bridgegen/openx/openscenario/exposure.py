@@ -53,7 +53,7 @@ def left_out(exposure: Exposure) -> list[str]:
     """Return what of an exposure the file does not hold, a sentence each."""
     notes = []
     matrix = exposure.copula.matrix
-    if np.any(matrix != np.eye(len(matrix))):
+    if np.any(matrix != np.eye(len(matrix))) or np.isfinite(exposure.copula.freedom):
         notes.append("OpenSCENARIO has no correlations: the file's parameters are independent")
     if exposure.feasible_share.estimate < 1.0:
         notes.append(

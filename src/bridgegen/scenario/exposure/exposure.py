@@ -1,10 +1,11 @@
 """How often a scenario is met, and with which values: the distribution that estimators sample.
 
 The joint distribution is that of the parameters' marginals, joined by a Gaussian copula of their
-normal scores; a marginal may depend on other parameters by formulas. The scenario's constraints
-condition it: rows that break one have probability 0, and the density of the others is raised by
-the same factor, one over the feasible share. The transform to standard normal space is that of the
-unconditioned distribution; there the feasible set is where `Exposure.feasible` holds.
+normal scores, or by Student's; a marginal may depend on other parameters by formulas. The
+scenario's constraints condition it: rows that break one have probability 0, and the density of the
+others is raised by the same factor, one over the feasible share. The transform to standard normal
+space is that of the unconditioned distribution; there the feasible set is where `Exposure.feasible`
+holds.
 Source: Rosenblatt, Annals of Mathematical Statistics 23 (1952) 470-472; for copulas see
 `bridgegen.scenario.exposure.dependence`.
 """
@@ -22,7 +23,7 @@ import scipy
 from bridgegen.base.arrays import Bool, Float, as_float
 from bridgegen.base.errors import InputError
 from bridgegen.base.statistics import clopper_pearson
-from bridgegen.scenario.exposure.dependence import GaussianCopula
+from bridgegen.scenario.exposure.dependence import Copula
 from bridgegen.scenario.exposure.marginals import Conditional, Marginal
 from bridgegen.scenario.language.constraints import order
 from bridgegen.scenario.language.kinds import slack
@@ -63,6 +64,26 @@ class Rate:
     def in_words(self, unit: str) -> str:
         """Return it with its interval, per a unit."""
         return f"{self.estimate:.3g} per {unit} (95 %: {self.low:.3g} to {self.high:.3g})"
+
+    def of_which(self, p: float, low: float, high: float) -> "Rate":
+        """Return how often an event happens that each has with a probability.
+
+        The intervals of both factors are combined as if their logarithms were independent.
+
+        Args:
+            p: the probability.
+            low: lower end of its interval.
+            high: its upper end.
+        """
+        estimate = self.estimate * p
+        # An end of 0 has no logarithm; the upper ends multiply, which holds in any case.
+        if not (estimate > 0.0 and self.low > 0.0 and low > 0.0):
+            return Rate(estimate, 0.0, self.high * high)
+        # Both factors are positive and skewed: their logarithms add, and so do the squares of the
+        # distances.
+        below = math.hypot(math.log(self.estimate / self.low), math.log(p / low))
+        above = math.hypot(math.log(self.high / self.estimate), math.log(high / p))
+        return Rate(estimate, estimate * math.exp(-below), estimate * math.exp(above))
 
 
 def poisson_interval(count: int, level: float = LEVEL) -> tuple[float, float]:
@@ -198,7 +219,7 @@ class Exposure:
     scenario: SearchedScenario
     space: SearchSpace
     marginals: Mapping[str, Marginal | Conditional]
-    copula: GaussianCopula
+    copula: Copula
     encounters: Encounters | None
     source: str
     place: str = field(default="", compare=False, repr=False)
@@ -208,7 +229,8 @@ class Exposure:
         single = [name for name, marginal in self.marginals.items() if marginal.apart]
         for number, name in enumerate(self.copula.names):
             row = self.copula.rows[number]
-            if name in single and any(row[k] for k in range(len(row)) if k != number):
+            others = any(row[k] for k in range(len(row)) if k != number)
+            if name in single and (others or name in self.copula.tied):
                 raise InputError(
                     f"{name} takes single values and has no correlation: make another parameter "
                     f"depend on it by a formula{at(self.place)}"

@@ -2,7 +2,8 @@
 
 Goodness of fit: Kolmogorov's distance, its p value by parametric bootstrap, because the table of
 the plain test does not hold for numbers that were fitted (Stute, Gonzáles Manteiga and Presedo
-Quindimil, Metrika 40 (1993) 243-256). Dependence: correlation of normal scores (van der Waerden).
+Quindimil, Metrika 40 (1993) 243-256). Dependence: correlation of normal scores (van der Waerden),
+or Student's copula where Akaike's criterion prefers it.
 Bands: the 2.5 and 97.5 % quantiles of fits to events that were drawn with replacement.
 """
 
@@ -23,7 +24,7 @@ from bridgegen.base.arrays import Float, as_float
 from bridgegen.base.errors import InputError
 from bridgegen.base.units import percent
 from bridgegen.scenario.exposure.candidates import Candidate, candidates, fit
-from bridgegen.scenario.exposure.dependence import GaussianCopula
+from bridgegen.scenario.exposure.dependence import BETTER, fit_freedom, scatter
 from bridgegen.scenario.exposure.exposure import WEIGHED, Exposure
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
 from bridgegen.scenario.exposure.marginals import Conditional, Form, Marginal
@@ -103,6 +104,7 @@ class Fit:
         correlated: the parameters of ``correlation``.
         correlation: ``(d, d)`` of normal scores.
         correlation_band: ``(2, d, d)`` its 95 % band.
+        freedom: degrees of freedom of Student's copula; None: it is Gaussian.
         replicates: exposures of the same forms, fitted to resampled events: how uncertain the data
             leave it.
         seed: of all chance.
@@ -119,6 +121,7 @@ class Fit:
     correlated: tuple[str, ...]
     correlation: Float
     correlation_band: Float
+    freedom: float | None
     replicates: tuple[Exposure, ...]
     seed: int
     notes: tuple[str, ...]
@@ -223,14 +226,21 @@ def fit_exposure(
     correlated = tuple(name for name in columns if not scenario.parameters[name].kind.apart)
     scores = np.array([_normal_scores(columns[name]) for name in correlated])
     correlation = _correlation(scores)
-    resampled = np.array(
-        [
-            _correlation(np.array([_normal_scores(columns[name][rows]) for name in correlated]))
-            for rows in draws
-        ]
+    freedom, gain = math.inf, 0.0
+    if before is None:
+        freedom, gain = fit_freedom(correlated, scores, correlation)
+        correlation = scatter(scores, correlation, freedom)
+    extreme = (
+        f"parameters are extreme together: Student's copula with {freedom:g} degrees of freedom is "
+        f"better than the Gaussian one by {gain:.1f} of Akaike's criterion"
     )
+    again = (
+        np.array([_normal_scores(columns[name][rows]) for name in correlated]) for rows in draws
+    )
+    resampled = np.array([scatter(item, _correlation(item), freedom) for item in again])
     weighed = ""
     if before is not None:
+        freedom = before.copula.freedom
         share = used / (used + LEAST_ROWS)
         at = [before.names.index(name) for name in correlated]
         known = before.copula.matrix[np.ix_(at, at)]
@@ -246,7 +256,10 @@ def fit_exposure(
             "source": " ".join(filter(None, [_source(source, origin, used), weighed])),
             **({"others": others} if others else {}),
             "parameters": {name: parameter_fit.section for name, parameter_fit in fitted.items()},
-            "dependence": {"correlation": _pairs(correlated, correlation)},
+            "dependence": {
+                "correlation": _pairs(correlated, correlation),
+                **({"degrees_of_freedom": freedom} if math.isfinite(freedom) else {}),
+            },
             **({"parameterisation": parameterisation.model_dump()} if parameterisation else {}),
         },
     }
@@ -276,9 +289,14 @@ def fit_exposure(
         correlated=correlated,
         correlation=correlation,
         correlation_band=np.quantile(resampled, [0.025, 0.975], axis=0),
+        freedom=freedom if math.isfinite(freedom) else None,
         replicates=_replicated(exposure, refits, correlated, resampled),
         seed=seed,
-        notes=(*([weighed] if weighed else []), *_notes(exposure, scenario, columns)),
+        notes=(
+            *([weighed] if weighed else []),
+            *([extreme] if gain >= BETTER else []),
+            *_notes(exposure, scenario, columns),
+        ),
     )
 
 
@@ -614,7 +632,7 @@ def _replicated(
             name: refits[name][k] if name in refits else marginal
             for name, marginal in exposure.marginals.items()
         }
-        copula = GaussianCopula(names, tuple(map(tuple, whole.tolist())))
+        copula = replace(exposure.copula, rows=tuple(map(tuple, whole.tolist())))
         made.append(replace(exposure, marginals=marginals, copula=copula))
     return tuple(made)
 

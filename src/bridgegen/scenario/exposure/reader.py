@@ -1,6 +1,7 @@
 """Exposures as files: which one a command takes, read, and written."""
 
 import json
+import math
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -12,7 +13,7 @@ import yaml
 from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, ScenarioError, StorageError, UnknownNameError
-from bridgegen.scenario.exposure.dependence import GaussianCopula
+from bridgegen.scenario.exposure.dependence import FREEDOMS, MOST_FREEDOM, Copula
 from bridgegen.scenario.exposure.exposure import Encounters, Exposure
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
 from bridgegen.scenario.exposure.marginals import Conditional, Marginal, Shared
@@ -68,6 +69,18 @@ def read_exposure(source: str | Path, scenario: SearchedScenario | None = None) 
             f"({document.at(('exposure_of',))})"
         )
     return build_exposure(document.below("exposure"), scenario, folder)
+
+
+def scenario_of(source: str | Path) -> str:
+    """Return the name of the scenario of which a file, or an example that ships, is an exposure.
+
+    Raises:
+        FileFormatError: the file cannot be read.
+        UnknownNameError: no such example.
+    """
+    document, _ = _document(source)
+    data = document.data if isinstance(document.data, dict) else {}
+    return str(data.get("exposure_of", "no scenario")).rpartition("/")[2]
 
 
 def exposure_of(scenario: LogicalScenario) -> Exposure | None:
@@ -216,9 +229,11 @@ def _marginals(
 
 def _copula(
     given: ExposureSection, document: Document, names_: tuple[str, ...], problems: list[str]
-) -> GaussianCopula:
+) -> Copula:
     """Return the dependence, and note what is wrong."""
     matrix = np.eye(len(names_))
+    freedom = math.inf if (given_ := given.dependence.degrees_of_freedom) is None else given_
+    named = {name for item in given.dependence.correlation for name in item.between}
     seen: set[frozenset[str]] = set()
     wrong = False
     for number, correlation_section in enumerate(given.dependence.correlation):
@@ -246,13 +261,21 @@ def _copula(
             continue
         problems.append(f"a correlation {rule} ({place})")
         wrong = True
-    if not wrong:
+    if given_ is not None and not (FREEDOMS[0] <= freedom <= MOST_FREEDOM and named):
+        problems.append(
+            f"degrees_of_freedom must be {FREEDOMS[0]:g} to {MOST_FREEDOM:g}, and stand with a "
+            f"correlation (0 is one), got {freedom:g} and {len(given.dependence.correlation)} "
+            "correlations "
+            f"({document.at(('dependence', 'degrees_of_freedom'))})"
+        )
+    elif not wrong:
         try:
-            return GaussianCopula(names_, tuple(map(tuple, matrix.tolist())))
+            tied = tuple(name for name in names_ if name in named and math.isfinite(freedom))
+            return Copula(names_, tuple(map(tuple, matrix.tolist())), freedom, tied)
         except InputError as error:
             place = document.at(("dependence",))
             problems += [f"{text} ({place})" for text in error.problems]
-    return GaussianCopula.independent(names_)
+    return Copula.independent(names_)
 
 
 # --- Which exposure a command takes: the one that is named, or the scenario's own ---

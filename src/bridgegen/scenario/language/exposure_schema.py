@@ -122,14 +122,17 @@ class CorrelationSection(ShapedSection):
     between: Annotated[list[Text], Field(min_length=2, max_length=2)]
     """Names of the two parameters."""
     value: Number
-    """Correlation of the parameters' normal scores, above -1 and below 1."""
+    """Correlation of the parameters' scores, above -1 and below 1."""
 
 
 class DependenceSection(ShapedSection):
     """How parameters depend on each other, besides formulas."""
 
     correlation: list[CorrelationSection] = []
-    """Correlations of a Gaussian copula; pairs that are not named have 0."""
+    """Correlations of the copula; pairs that are not named have 0."""
+    degrees_of_freedom: Number | None = None
+    """Degrees of freedom of Student's copula, from 2: the fewer, the likelier are the parameters
+    that have a correlation extreme together. The copula is Gaussian by default."""
 
 
 class EncountersSection(ShapedSection):

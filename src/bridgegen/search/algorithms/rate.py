@@ -71,6 +71,13 @@ SURE = 4.0
 DOUBT = 1.25
 """By what deviations of a model are divided: models of a few hundred rows are too certain."""
 
+RAMP = 10.0
+"""Number of known critical rows with which a row counts half as much as one that is drawn last."""
+
+LEAST_SHARE = 0.6
+"""Least part of the rows set aside for the rate that is used for it; the others seek failures. They
+become fewer from about a quarter of the failures on that the precision needs."""
+
 
 class Everywhere:
     """The road of a search without an exposure: the unit cube, uniformly; see `Road`."""
@@ -167,6 +174,26 @@ class _Model:
     likely: Float | None
 
 
+def row_weights(draws: Draws) -> Float:
+    """Return what each row adds to the estimate if it is harmful, ``(n,)``.
+
+    Batches count by their number of rows, and by the failures that were known before them: rows
+    that were drawn before there was a model vary most. Both are known when a batch is drawn, so
+    each batch is unbiased whatever the model.
+    """
+    counts = draws.known / (draws.known + RAMP)
+    if not counts.sum() > 0.0:
+        counts = np.ones(len(draws.known))
+    weights: Float = draws.weights * counts / counts.sum()
+    return weights
+
+
+def effective(parts: Float) -> float:
+    """Return as how many equal parts parts count: 0 where all are 0."""
+    # They are where failures were known only after the last batch was drawn.
+    return float(parts.sum()) ** 2 / max(float(np.sum(parts * parts)), 1e-300)
+
+
 class Rate:
     """Failures, and how often they happen, from one budget; see the module."""
 
@@ -184,10 +211,22 @@ class Rate:
         ),
         "road": Setting(0.25, "share of the rows that are drawn as on the road", 0.01, 0.5),
         "even": Setting(0.05, "share of the rows that are uniform over the ranges", 0.0, 0.25),
-        "rate": Setting(0.25, "share of the rows that make the rate precise", 0.0, 0.5),
+        "rate": Setting(
+            0.25,
+            "share of the rows that make the rate precise; less once many failures are known",
+            0.0,
+            0.5,
+        ),
         "apart": Setting(
             0.1,
             "distance kept from critical rows, as a share of the ranges, in root mean square",
+            0.0,
+            1.0,
+        ),
+        "precision": Setting(
+            0.2,
+            "end when the 95 % interval's half-width is below this fraction of the probability, "
+            "and no failure mode is new; 0: at the end of the budget",
             0.0,
             1.0,
         ),
@@ -195,33 +234,43 @@ class Rate:
     objectives: ClassVar[Arity] = "one"
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
-        self._values = resolve(type(self), problem, seed, settings)
-        self._road: Road = problem.road or Everywhere(problem.n_var)
+        self.values = resolve(type(self), problem, seed, settings)
+        self.road: Road = problem.road or Everywhere(problem.n_var)
         self._is_even = problem.road is None
-        self._known = Known(problem, self._values["apart"])
+        self._known = Known(problem, self.values["apart"])
         self._rng = np.random.Generator(np.random.PCG64(seed))
         self._of_objective: Parameters | None = None
         self._of_label: Parameters | None = None
-        self.draws = Draws.none(problem.n_var, self._road.dimensions)
+        self.draws = Draws.none(problem.n_var, self.road.dimensions)
+
+    @property
+    def critical(self) -> Bool:
+        """Which of the rows that are told are critical, in the order of ``draws``."""
+        return self._known.critical
 
     def ask(self) -> Float:
         """Return rows as on the road and over the ranges at first, then batches."""
-        known, values = self._known, self._values
+        known, values = self._known, self.values
         many = max(int(known.critical.sum()), len(known) // 10)
         n = max(values["batch"], int(values["growth"] * many)) if len(known) else values["initial"]
         pool = self._pool()
         as_road, evenly = values["road"], values["even"]
+        if not known.critical.any():  # where harm is rare, rows as on the road do not lead to it
+            evenly = as_road
         blind = as_road * _shared(pool.road) + evenly * _shared(pool.even)
         model = self._model(pool) if len(known) else None
         seek = self._seeker(pool, model, n) if model else None
         stated, base = as_road + evenly, blind
         if model and model.likely is not None:
-            stated += values["rate"]
+            hits = effective(row_weights(self.draws)[known.critical])
+            part = 1.0 / max(hits * values["precision"] ** 2, 1e-9)
+            rate = values["rate"] * min(max(part, LEAST_SHARE), 1.0)
+            stated += rate
             # Where harm is rare, what is hardly likely outweighs it on the road: half of these rows
             # go where it is likely in any case.
             for power in (1.0, SURE):
                 weights = pool.road * model.likely**power
-                base = base + 0.5 * values["rate"] * _shared(weights)
+                base = base + 0.5 * rate * _shared(weights)
         taken: list[int] = []
         chances, parts = np.empty(n), np.empty(n)
         for k in range(n):
@@ -253,7 +302,7 @@ class Rate:
 
     def _pool(self) -> _Pool:
         """Return a new pool."""
-        rng, road, known = self._rng, self._road, self._known
+        rng, road, known = self._rng, self.road, self._known
         best = np.argsort(known.F, kind="stable")[:BEST]
         bases = self.draws.Z[np.union1d(known.distinct[-FOUND:], best)]
         a, b = (POOL_ROAD, POOL_EVEN) if len(bases) else (0.5, 0.5)
@@ -308,7 +357,7 @@ class Rate:
         some = rng.permutation(len(pool.U))[:PATHS]
         paths = model.objective.sample(pool.points[some], max(n // 3, 1), rng)
         off = distances(pool.points, known.points[known.distinct])
-        apart, joined = self._values["apart"], 0
+        apart, joined = self.values["apart"], 0
 
         def seek(k: int, taken: list[int]) -> Float:
             nonlocal apart, joined, off

@@ -7,9 +7,9 @@ divided further only where its rows form clusters in the space of parameters tha
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,8 @@ cluster."""
 MOST_CLUSTERED = 500
 """Largest number of rows of a group whose distances are compared; the others join the nearest of
 these."""
+
+T = TypeVar("T")
 
 
 class Key(NamedTuple):
@@ -90,6 +92,22 @@ def keys_of(
     columns = zip(*(text.tolist() for text in texts), partner, place, cause, strict=True)
     known: dict[tuple[str, ...], Key] = {}
     return [known.setdefault(column, Key(*column)) for column in columns]
+
+
+def of_found(found: Container[T], failures: Sequence[T]) -> tuple[int, int] | None:
+    """Return how many of some random failures are of a mode that a run found, and of how many.
+
+    Their share is that of the critical volume which is of a known kind. By distance from what was
+    found it was 0 % in most scenarios of ten parameters, however much was found.
+
+    Args:
+        found: the modes of the run's failures.
+        failures: ``(n,)``, the mode of each random failure.
+
+    Returns:
+        None where n is 0.
+    """
+    return (sum(mode in found for mode in failures), len(failures)) if failures else None
 
 
 def by_harm(harm: Float, U: Float) -> Int:

@@ -1,19 +1,19 @@
 """How likely harm is, from the rows of a search that were drawn with known chances."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
-from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.base.arrays import Bool, Int
 from bridgegen.base.statistics import clopper_pearson, weighted_counts
-from bridgegen.search.algorithms.rate import Draws
+from bridgegen.scenario.exposure.exposure import Rate
+from bridgegen.search.algorithms.rate import Draws, effective, row_weights
 from bridgegen.search.triage.record import Frequency
 
 FEWEST_HITS = 12.0
 """Effective number of failures below which an interval is not believed."""
-
-RAMP = 10.0
-"""Number of known critical rows with which a row counts half as much as one that is drawn last."""
 
 UNSEEN = 3.0
 """Expected number of failures, none of which is seen with a probability of 5 %."""
@@ -28,26 +28,16 @@ class Drawn:
         ids: ``(n,)``, the evaluation of each; some may have been drawn twice.
         share: the feasible share of the exposure, and its interval: low, estimate, high.
         source: of the exposure; "" where rows stand for the ranges.
+        met: how often the scenario is met, by the amount of driving; empty where that is not known.
+        left: evaluations of the budget that were not needed.
     """
 
     draws: Draws
     ids: Int
     share: tuple[float, float, float]
     source: str
-
-
-def row_weights(draws: Draws) -> Float:
-    """Return what each row adds to the estimate if it is harmful, ``(n,)``.
-
-    Batches count by their number of rows, and by the failures that were known before them: rows
-    that were drawn before there was a model vary most. Both are known when a batch is drawn, so
-    each batch is unbiased whatever the model.
-    """
-    counts = draws.known / (draws.known + RAMP)
-    if not counts.sum() > 0.0:
-        counts = np.ones(len(draws.known))
-    weights: Float = draws.weights * counts / counts.sum()
-    return weights
+    met: Mapping[Literal["hour", "1,000 km"], Rate] = field(default_factory=dict)
+    left: int = 0
 
 
 def how_likely(drawn: Drawn, happens: Bool) -> Frequency:
@@ -68,8 +58,7 @@ def how_likely(drawn: Drawn, happens: Bool) -> Frequency:
     road, low, high = float(draws.road.sum()), 0.0, min(UNSEEN / max(draws.road.sum(), 1e-9), 1.0)
     if not len(parts):
         return Frequency(estimate=0.0, low=low, high=high, hits=0.0)
-    # 0 where failures were known only after the last batch was drawn.
-    hits = float(parts.sum()) ** 2 / max(float(np.sum(parts * parts)), 1e-300)
+    hits = effective(parts)
     if hits < FEWEST_HITS:
         seen = float(np.sum((draws.road * draws.weights)[hit]))
         _, high = clopper_pearson(min(seen, road), road)

@@ -26,13 +26,10 @@ MOST_EXAMPLES = 20
 
 MOST_NEIGHBOURHOODS = 2000
 
-NEAR = 0.1
-"""Distance within which scenarios are no different ones: root mean square of the differences of the
-searched parameters, as shares of what is searched."""
-
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Change = Annotated[float, Field(ge=-1.0, le=1.0)]
+Amount = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=10**8)]
 Text = Annotated[str, Field(max_length=2000)]
 Drawn = Literal["random", "sobol", "fresh", ""]
@@ -102,13 +99,16 @@ class FreshRows(_Model):
     Attributes:
         harm: of each; None of one without a result, or with implausible traffic.
         mode: the number of the failure mode that each is of; 0 of no recorded one.
-        near: harmful ones within `NEAR` of a failure that was found; None in records of earlier
-            versions.
     """
 
     harm: Annotated[tuple[Share | None, ...], Field(max_length=10_000)]
     mode: Annotated[tuple[Count, ...], Field(max_length=10_000)]
-    near: Count | None = None
+
+    @property
+    def failures(self) -> list[int]:
+        """The mode of each harmful one."""
+        pairs = zip(self.harm, self.mode, strict=True)
+        return [mode for harm, mode in pairs if harm is not None and harm >= NEAR_MISS]
 
 
 class Frequency(_Model):
@@ -126,7 +126,7 @@ class Frequency(_Model):
     estimate: Share | None
     low: Share
     high: Share
-    hits: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+    hits: Amount
     doubt: Text = ""
 
     @property
@@ -139,6 +139,29 @@ class Frequency(_Model):
         return f"{self.estimate:.2g} (95 %: {self.low:.2g} to {self.high:.2g})"
 
 
+class PerAmount(_Model):
+    """How often harm happens on the road, in an amount of driving.
+
+    Attributes:
+        unit: the amount: "hour" or "1,000 km".
+        estimate: how often; None where the probability of harm is not estimated.
+        low: lower end of the 95 % interval.
+        high: its upper end.
+    """
+
+    unit: Literal["hour", "1,000 km"]
+    estimate: Amount | None
+    low: Amount
+    high: Amount
+
+    @property
+    def sentence(self) -> str:
+        """In words: "0.21 per hour (95 %: 0.16 to 0.39)"."""
+        if not self.estimate:
+            return f"at most {self.high:.2g} per {self.unit} (95 %)"
+        return f"{self.estimate:.2g} per {self.unit} (95 %: {self.low:.2g} to {self.high:.2g})"
+
+
 class Rate(_Model):
     """How likely harm is, from the rows of a search that were drawn with known chances.
 
@@ -148,13 +171,17 @@ class Rate(_Model):
         met: whether weather is as it is met, without an exposure.
         rows: that were drawn, repeated ones included.
         road: of them, how many were drawn as on the road.
+        per: how often harm happens, where the exposure says how often the scenario is met.
+        left: evaluations of the budget that were not needed: what was found sufficed.
     """
 
     harm: Frequency
     source: Text
     met: bool
     rows: Count
-    road: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+    road: Amount
+    per: Annotated[tuple[PerAmount, ...], Field(max_length=2)] = ()
+    left: Count = 0
 
     @property
     def sentence(self) -> str:
@@ -164,7 +191,9 @@ class Rate(_Model):
         else:
             even = "weather as it is met, all else uniform" if self.met else "uniform"
             of = f"of the ranges ({even}; not a rate on roads: no exposure is given)"
-        return f"P(harm) {self.harm.sentence}, {of}"
+        often = f"; {', '.join(amount.sentence for amount in self.per)}" if self.per else ""
+        early = f"; {self.left:,} evaluations were not needed" if self.left else ""
+        return f"P(harm) {self.harm.sentence}, {of}{often}{early}"
 
 
 class Treatment(_Model):

@@ -22,7 +22,6 @@ from bridgegen.engine.trials import EVENT
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.scenario.language.prior import surprise
 from bridgegen.scenario.odd.bounding import OddBound
-from bridgegen.search.surrogates.known import distances
 from bridgegen.search.triage.bound import (
     CONTACT,
     UNBIASED,
@@ -54,7 +53,6 @@ from bridgegen.search.triage.rates import how_likely
 from bridgegen.search.triage.record import (
     MOST_EXAMPLES,
     MOST_MODES,
-    NEAR,
     Drawn,
     Estimate,
     Frequency,
@@ -63,6 +61,7 @@ from bridgegen.search.triage.record import (
     Minimal,
     Mode,
     Neighbourhood,
+    PerAmount,
     Rate,
     Repeated,
     StepCheck,
@@ -472,11 +471,9 @@ class _Triage:
                 mode[i] = same[int(np.argmin(gaps))] + 1
         ok = int(results.ok.sum())
         harm = zip(results.harm.tolist(), results.ok.tolist(), strict=True)
-        off = distances(U[results.harmful & results.ok], own)
         fresh = FreshRows(
             harm=tuple(item if has else None for item, has in harm),
             mode=tuple(mode),
-            near=int((off < NEAR).sum()),
         )
         each = [drawn_of("fresh", mode.count(k), ok) for k in range(1, len(groups) + 1)]
         return drawn_of("fresh", int(results.harmful.sum()), ok), each, fresh
@@ -582,9 +579,21 @@ class _Triage:
         if (harm := self._how_likely(self._at)) is None or self._drawn is None:
             return None
         priors = [self._space.parameters[name].prior for name in self._space.variables]
+        per = []
+        for unit, met in self._drawn.met.items():
+            some = met.of_which(harm.estimate or 0.0, harm.low, harm.high)
+            per.append(
+                PerAmount(
+                    unit=unit,
+                    estimate=None if harm.estimate is None else some.estimate,
+                    low=some.low,
+                    high=some.high,
+                )
+            )
         return Rate(
-            harm=harm, source=self._drawn.source, met=any(priors),
+            harm=harm, source=self._drawn.source, met=any(priors), per=tuple(per),
             rows=len(self._drawn.ids), road=float(self._drawn.draws.road.sum()),
+            left=self._drawn.left,
         )  # fmt: skip
 
     def _avoids(self, at: Int) -> Bool:

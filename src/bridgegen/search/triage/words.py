@@ -3,7 +3,8 @@
 from bridgegen.base.statistics import clopper_pearson
 from bridgegen.base.units import percent
 from bridgegen.search.triage.influence import ends_in_words, in_words
-from bridgegen.search.triage.record import NEAR, Mode, Triage
+from bridgegen.search.triage.modes import of_found
+from bridgegen.search.triage.record import Mode, Triage
 
 
 def headline(found: Triage) -> str:
@@ -12,24 +13,20 @@ def headline(found: Triage) -> str:
 
 
 def covered(found: Triage | None) -> tuple[int, int] | None:
-    """Return how many fresh random failures lie near one that was found, of how many; or None."""
-    if found is None or found.fresh is None or found.fresh.near is None:
+    """Return how many fresh random failures are of a mode that was found, of how many; or None."""
+    if found is None or found.fresh is None or not found.bound.harmful:
         return None
-    harmful = found.bound.space.harmful
-    return (found.fresh.near, harmful) if harmful and found.bound.harmful else None
+    return of_found(range(1, len(found.modes) + 1), found.fresh.failures)
 
 
 def covered_in_words(found: Triage) -> str:
-    """Return the share of fresh random failures that lies near one that was found, or ""."""
+    """Return the share of fresh random failures that is of a mode that was found, or ""."""
     if (counts := covered(found)) is None:
         return ""
-    near, harmful = counts
-    low, high = clopper_pearson(near, harmful)
-    return (
-        f"{near} of the {harmful} that fail, {percent(near / harmful)} ({percent(low)} "
-        f"to {percent(high)}), lie within {NEAR:g} of a failure found (root mean square of the "
-        "searched parameters' shares)"
-    )
+    known, every = counts
+    low, high = (percent(end) for end in clopper_pearson(known, every))
+    share = f"{percent(known / every)} ({low} to {high}, 95 % confidence)"
+    return f"{known} of the {every} that fail, {share}, are of a failure mode found"
 
 
 def mode_in_words(mode: Mode, found: Triage) -> str:

@@ -47,7 +47,7 @@ def estimate(
     found = importance.estimate(problem, part, seed, start)
     spent += found.evaluations
     if not found.doubts:
-        return "importance", why, replace(found, evaluations=spent)
+        return "importance", why, replace(found, evaluations=spent, road=first.road)
     doubt = found.doubts[0]
     if found.facts.get("reached", 1.0):
         least = found.probability(aim.threshold).low
@@ -57,7 +57,7 @@ def estimate(
         # Subset simulation is not believed below what importance sampling has shown at least.
         if not found.doubts and found.probability(aim.threshold).high >= least:
             why = f"{why}, and importance sampling is in doubt ({doubt})"
-            return "subset", why, replace(found, evaluations=spent)
+            return "subset", why, replace(found, evaluations=spent, road=first.road)
     return (
         "mc",
         f"{why}, and other methods are in doubt ({doubt})",

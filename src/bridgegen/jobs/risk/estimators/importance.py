@@ -50,7 +50,7 @@ class Evidence:
         """Return a result of importance sampling with its doubts, facts and final upper end.
 
         It is compared with subset simulation and then with exploration, unless these are in doubt.
-        The first one that agrees raises the upper end by what it may have missed.
+        Those that agree raise the upper end by what all of them may have missed.
         """
         # Whoever of subset simulation and exploration is not in doubt and agrees with the result
         # bounds what the proposals do not cover.
@@ -58,13 +58,20 @@ class Evidence:
         if not believed:
             believed = [self.spread if len(self.spread.Z) and not self.helped else self.levels]
         found = [self._compared(result, known, aim) for known in believed]
-        best = next((weighted for weighted in found if not weighted.doubts), found[0])
+        pairs = zip(believed, found, strict=True)
+        agreeing = [(known, weighted) for known, weighted in pairs if not weighted.doubts]
+        best = agreeing[0][1] if agreeing else found[0]
+        if len(agreeing) > 1:  # what is unseen was missed by both, which share no random numbers
+            low, share, high = result.share
+            unseen = self._unseen(sum(self._worth(known, aim) for known, _ in agreeing))
+            best = replace(best, share=(low, share, high / (1.0 - unseen)))
         return replace(best, facts={**best.facts, "spread": float(self.spread.rows)})
 
     def _compared(self, result: Weighted, known: Weighted, aim: Aim) -> Weighted:
         """Return a result with the doubts, facts and upper end that one known result implies."""
         low, share, high = result.share
-        result = replace(result, share=(low, share, high / (1.0 - self._unseen(known, aim))))
+        unseen = self._unseen(self._worth(known, aim))
+        result = replace(result, share=(low, share, high / (1.0 - unseen)))
         facts = {
             "effective_hits": result.hits(result.there(aim.threshold)),
             "heaviest": _heaviest(result, aim),
@@ -102,26 +109,30 @@ class Evidence:
                 f"sampling {found.low:.2g} to {found.high:.2g}"
             )
 
-    def _unseen(self, known: Weighted, aim: Aim) -> float:
-        """Return an upper bound of the event's probability that proposals do not cover, a share.
+    def _worth(self, known: Weighted, aim: Aim) -> float:
+        """Return how many independent harmful rows a known result is worth.
 
-        A known result is worth n independent harmful rows. For subset simulation n = 1 / c², where
-        c is the relative standard error; for exploration n is its effective number of harmful rows.
-        None of the n rows lies in a region that was not found, and the share `single` of them is at
-        single points. The bound is the upper end of the exact interval for that share (Clopper and
-        Pearson, one-sided, 95 %): about 3 / n without single points.
+        For subset simulation 1 / c², where c is the relative standard error; for exploration its
+        effective number of harmful rows.
         """
         there = known.there(aim.threshold)
-        if known.repetitions:
-            sums = known.sums(there)
-            if len(sums) < 2 or not sums.mean() > 0.0:
-                return MOST_UNSEEN
-            error = float(sums.std(ddof=1) / sums.mean())
-            # As many independent harmful rows as the error is worth: a region that n of them all
-            # miss has less than 3 / n of the probability (95 %).
-            n = len(sums) / max(error * error, 1e-12)
-        else:
-            n = known.hits(there)
+        if not known.repetitions:
+            return known.hits(there)
+        sums = known.sums(there)
+        if len(sums) < 2 or not sums.mean() > 0.0:
+            return 0.0
+        error = float(sums.std(ddof=1) / sums.mean())
+        # As many independent harmful rows as the error is worth: a region that n of them all miss
+        # has less than 3 / n of the probability (95 %).
+        return len(sums) / max(error * error, 1e-12)
+
+    def _unseen(self, n: float) -> float:
+        """Return an upper bound of the event's probability that proposals do not cover, a share.
+
+        None of n independent harmful rows lies in a region that was not found, and the share
+        `single` of them is at single points. The bound is the upper end of the exact interval for
+        that share (Clopper and Pearson, one-sided, 95 %): about 3 / n without single points.
+        """
         missed = min(self.single * n, n)
         if n - missed <= 0.0:
             return MOST_UNSEEN
@@ -193,7 +204,7 @@ def learn(
 
 PREPARED, FOUND = 0.6, 0.5
 """The share of the budget that subset simulation may take, and the precision at which it stops."""
-EXPLORED, CHECKED = 0.5, 0.1
+EXPLORED, CHECKED = 0.5, 0.3
 """The share of what is left that exploration may take, if subset simulation is in doubt or not."""
 STRANGE = 0.25
 """Largest share of the first proposals that are around spread points rather than those of

@@ -67,6 +67,8 @@ class Weighted:
         evaluations: that it took, preparation included.
         doubts: why the interval should not be believed, a sentence each.
         facts: diagnostics by name.
+        road: ``(n, C)`` whole outcomes, harmless ones as well, of the first independent rows that
+            were drawn as on the road; there may be none.
     """
 
     Z: Float
@@ -80,6 +82,7 @@ class Weighted:
     evaluations: int
     doubts: tuple[str, ...] = ()
     facts: dict[str, float] = field(default_factory=dict)
+    road: Float = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def scores(self) -> Float:
@@ -123,6 +126,54 @@ class Weighted:
         # The factor has an uncertainty of its own: the ends move by it.
         low, middle, high = self.share
         return found.widened(low / middle, high / middle)
+
+    def draws(self, values: Float, random: np.random.Generator, n: int) -> tuple[Float, ...]:
+        """Return draws of confidence distributions of a mean, of which sums of means are made.
+
+        Args:
+            values: as for `mean`.
+            random: all random numbers.
+            n: how many draws.
+
+        Returns:
+            ``(n,)`` each: of which lower ends are quantiles; the same, raised by what regions may
+            have that were not seen; and that with one more hit of the largest weight, of which the
+            upper ends of the mean by itself are quantiles (Fay and Feuer's upper end).
+        """
+        parts = self.weights * values
+        held = parts[parts > 0.0]
+        if self.repetitions:
+            sums = self.sums(values)
+            # Student's spread of the mean of few, by the variance of a gamma distribution.
+            wide = float(scipy.stats.t.ppf(0.975, len(sums) - 1) / scipy.stats.norm.ppf(0.975)) ** 2
+            lower, upper = (
+                _gamma(float(some.mean()), wide * float(some.var(ddof=1)) / len(sums), random, n)
+                for some in (sums, np.append(sums, sums.max()))
+            )
+            upper = upper if held.size else np.ones(n)
+        elif not held.size or np.ptp(held) == 0.0:
+            hits, rows = held.size, self.rows
+            factor = rows * float(held[0] if hits else self.largest)
+            lower = factor * random.beta(hits, rows - hits + 1, n) if hits else np.zeros(n)
+            upper = np.full(n, factor) if rows else np.ones(n)
+            if hits < rows:
+                upper = factor * random.beta(hits + 1, rows - hits, n)
+        else:
+            total, square, largest = float(held.sum()), float(held @ held), float(held.max())
+            lower = _gamma(total, square, random, n)
+            upper = _gamma(total + largest, square + largest**2, random, n)
+        low, middle, high = self.share
+        less, more = random.exponential(size=(2, n))
+        # 97.5 % of exponential numbers are below 3.69, and 95 % below 3, as in the rule of three.
+        lowered = np.maximum(1.0 - (1.0 - low / middle) * less / 3.69, 0.0)
+        raised = 1.0 + (high / middle - 1.0) * more / 3.0
+        return lower * lowered, np.minimum(lower * raised, 1.0), np.minimum(upper * raised, 1.0)
+
+
+def _gamma(mean: float, variance: float, random: np.random.Generator, n: int) -> Float:
+    if not (mean > 0.0 and variance > 0.0):
+        return np.full(n, mean)
+    return random.gamma(mean * mean / variance, variance / mean, n)
 
 
 def of_counts(hits: int, rows: int, each: float) -> Probability:
