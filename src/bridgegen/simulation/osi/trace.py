@@ -315,8 +315,8 @@ def _border(lane: "Lane", side: str, known: dict[bytes, Parts], first: int, part
     known[key] = _id(first + len(known))
     kind, point = _MARKS.get(mark, "SOLID_LINE"), "LaneBoundary.BoundaryPoint"
     width, color = (0.0, "NONE") if kind == "NO_LINE" else (_MARK_WIDTH, "WHITE")
-    if kind != "DASHED_LINE":  # viewers draw its dashes from point to point
-        points = _thinned(points)
+    # Viewers draw dashes and gaps from point to point: 6 m each.
+    points = _thinned(points, 3 if kind == "DASHED_LINE" else len(points))
     border = message(
         "LaneBoundary",
         id=known[key],
@@ -335,7 +335,9 @@ def _lane(lane: "Lane", ids: dict[str, Parts], left: Parts, right: Parts) -> Par
     classification = message(
         kind,
         type="DRIVING" if lane.kind in DRIVABLE else "NONDRIVING",
-        centerline=[_vector(x, y) for x, y in _thinned(lane.centre[:, :2]).tolist()],
+        centerline=[
+            _vector(x, y) for x, y in _thinned(lane.centre[:, :2], len(lane.centre)).tolist()
+        ],
         centerline_is_driving_direction=True,
         left_adjacent_lane_id=_known(ids, lane.left_lane),
         right_adjacent_lane_id=_known(ids, lane.right_lane),
@@ -350,9 +352,12 @@ def _lane(lane: "Lane", ids: dict[str, Parts], left: Parts, right: Parts) -> Par
     return message("Lane", id=ids[lane.id], classification=classification)
 
 
-def _thinned(points: Float) -> Float:
-    """Return a line without points that lie on it, by Ramer's, Douglas' and Peucker's algorithm."""
-    keep, todo = {0, len(points) - 1}, [(0, len(points) - 1)]
+def _thinned(points: Float, every: int) -> Float:
+    """Return a line without points that lie on it, by Ramer's, Douglas' and Peucker's algorithm.
+
+    Points of which the number is a multiple of ``every`` stay.
+    """
+    keep, todo = {*range(0, len(points), every), len(points) - 1}, [(0, len(points) - 1)]
     while todo:
         a, b = todo.pop()
         if b - a < 2:
