@@ -5,6 +5,7 @@ import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -255,11 +256,22 @@ def new(
             autocompletion=completing("scenario"),
         ),
     ] = None,
+    says: Annotated[
+        str | None,
+        typer.Option(
+            help="Start from a sentence in controlled English, such as 'a car cuts in 20 m ahead'; "
+            "prints each phrase beside its key, and refuses what is not understood."
+        ),
+    ] = None,
 ) -> None:
     """Write a commented scenario file to start from."""
     from bridgegen.scenario.language.starter import start_scenario
 
-    path = start_scenario(name, like=like)
+    path = start_scenario(name, like=like, says=says)
+    if says is not None:
+        _, *lines = path.read_text("utf-8").splitlines()  # the first one is for editors
+        head = takewhile(lambda line: line.startswith("# "), lines)
+        print(*(line.removeprefix("# ") for line in head), sep="\n")
     print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
 
 

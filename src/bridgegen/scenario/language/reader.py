@@ -339,6 +339,13 @@ class _Declarations:
                 f"parameters.{name}.default must be {kind.expected()}, got {given.default!r}"
                 f"{at(place)}"
             )
+        if given.only is not None:
+            low = high = default
+            if not kind.names or kind.read(given.only, low, high) != default:
+                raise ScenarioError(
+                    f"parameters.{name}.only must be the default of a category, got {given.only!r}"
+                    f"{at(place)}"
+                )
         self.parameters.append(
             Parameter(
                 self._prefix + name,

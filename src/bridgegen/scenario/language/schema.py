@@ -158,6 +158,8 @@ class ParameterSection(ShapedSection):
     """Largest value, in the parameter's unit; of an angle, it may be less than the smallest."""
     values: Annotated[list[Text], Field(min_length=2)] | None = None
     """Names of a category's values."""
+    only: Text | None = None
+    """The one value of a category that it has here; by default it may have any."""
     default: NumberOrName
     """Value of the parameter while its axis is not searched."""
     description: Text

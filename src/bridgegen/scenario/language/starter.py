@@ -10,25 +10,31 @@ from pathlib import Path
 
 from bridgegen.base.errors import InputError, StorageError, UnknownNameError
 from bridgegen.scenario.language.json_schema import FILE, refuse_other_schema, write_schema
+from bridgegen.scenario.language.narrowed import narrow
 from bridgegen.scenario.language.reader import names, pack_names, shipped_text
+from bridgegen.scenario.language.sentence import read_sentence
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
-def start_scenario(name: str, *, like: str | None = None, folder: Path | None = None) -> Path:
+def start_scenario(
+    name: str, *, like: str | None = None, says: str | None = None, folder: Path | None = None
+) -> Path:
     """Write ``NAME.yaml``, a valid scenario that its reader can make their own, and its schema.
 
     Args:
         name: of the scenario and its file.
         like: a scenario of the catalogue or of a pack to copy; by default a small one that
             explains itself.
+        says: a sentence, of which the scenario is made (of the catalogue's ``like``, or of the one
+            that it says); what was understood stands at the head of the file.
         folder: where to; by default here.
 
     Returns:
         The file.
 
     Raises:
-        InputError: the name is no word.
+        InputError: the name is no word, or the sentence is not understood or not possible.
         UnknownNameError: no such scenario.
         StorageError: there is such a file already, or what is called like the schema and is none,
             or it cannot be written.
@@ -39,7 +45,9 @@ def start_scenario(name: str, *, like: str | None = None, folder: Path | None = 
         )
     if name in names():
         raise InputError(f"'{name}' ships with BridgeGen; choose another name")
-    if like is None:
+    if says is not None:
+        text = narrow(read_sentence(says, like), name)
+    elif like is None:
         text = (
             resources.files("bridgegen.scenario.language")
             .joinpath("starter.yaml")
