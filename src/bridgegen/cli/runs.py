@@ -354,7 +354,9 @@ def simulate(
     trace: Annotated[
         Path | None,
         typer.Option(
-            help="A new .csv of every entity's time, x, y, h and speed.", rich_help_panel=OUTPUT
+            help="A new .csv of every entity's time, x, y, h and speed; or a new .mcap of ASAM "
+            "OSI: SensorView if its name ends in _sv.mcap, else GroundTruth.",
+            rich_help_panel=OUTPUT,
         ),
     ] = None,
     metrics: common.OnlyMetrics = None,
@@ -416,7 +418,7 @@ def simulate(
     for note in result.notes:
         print(f"bridgegen: note: {note}", file=sys.stderr)
     if trace is not None:
-        write_trace(trace, result.rollout)
+        write_trace(trace, result.rollout, around=result.around)
     if as_json:
         facts: dict[str, object] = {
             "file": str(file),
