@@ -218,7 +218,7 @@ def validate(
         list[str] | None,
         typer.Argument(
             metavar="FILE",
-            help="Files: .owl, .xodr, .xosc or .yaml; or drivers of your own: module:Class, "
+            help="Files: .owl, .xodr, .osc, .xosc or .yaml; or drivers of your own: module:Class, "
             "file.py:Class, file.py:function, file.fmu, connect:HOST:PORT, unix:PATH, "
             "'exec:COMMAND'.",
             show_default=False,
@@ -286,7 +286,14 @@ def validate(
 def _is_driver(text: str) -> bool:
     """Return whether a text names a driver, not a file to check."""
     path = Path(text)
-    if ":" not in text and path.suffix.lower() in (".owl", ".xodr", ".xosc", ".yaml", ".yml"):
+    if ":" not in text and path.suffix.lower() in (
+        ".owl",
+        ".xodr",
+        ".osc",
+        ".xosc",
+        ".yaml",
+        ".yml",
+    ):
         return False  # without what drivers import
     from bridgegen.drivers import DRIVERS, is_remote
     from bridgegen.drivers.planners import planners

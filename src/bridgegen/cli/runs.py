@@ -252,7 +252,8 @@ def new(
     like: Annotated[
         str | None,
         typer.Option(
-            help="Start from a copy of this catalogue scenario.",
+            help="Start from a copy of this catalogue scenario, or from this OpenSCENARIO DSL file "
+            "(.osc), as YAML.",
             autocompletion=completing("scenario"),
         ),
     ] = None,
@@ -321,7 +322,7 @@ def simulate(
     scenario: Annotated[
         str,
         typer.Argument(
-            help="An OpenSCENARIO file (.xosc); or a catalogue name or the path of a YAML file, of "
+            help="An OpenSCENARIO file (.xosc); or a catalogue name, a YAML or .osc file, of "
             "which one row is simulated.",
             autocompletion=completing("scenario"),
         ),
@@ -385,7 +386,9 @@ def simulate(
     stages = None if ideal is None else split(ideal)
     skipped: list[str] | None = [] if lenient else None
     file, runs = Path(scenario), common.read_simulator(simulator, simulator_set, connection)
-    is_logical = file.suffix.lower() in (".yaml", ".yml") or not (file.suffix or file.exists())
+    is_logical = file.suffix.lower() in (".yaml", ".yml", ".osc") or not (
+        file.suffix or file.exists()
+    )
     if is_logical or fix or distribution or odd:
         from bridgegen.jobs.search.model import simulate_scenario  # takes longer than a file
 

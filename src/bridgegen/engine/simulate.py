@@ -134,7 +134,7 @@ def simulate_file(
         UnknownNameError: no such driver, vehicle, stage, metric or reading of empty triggers.
     """
     path = Path(path)
-    if path.suffix.lower() in (".yaml", ".yml"):
+    if path.suffix.lower() in (".yaml", ".yml", ".osc"):
         raise FileFormatError(
             f"{path}: one OpenSCENARIO file (.xosc) is simulated; a YAML file describes many "
             f"scenarios, of which 'bridgegen simulate' and bridgegen.model simulate one"

@@ -287,7 +287,8 @@ class ScenarioFile(ShapedSection):
     """Country by whose law it is judged, see docs/conflicts.md; German law by default, or on the
     left its mirror image."""
     driver: Word = "route-follower"
-    """Default driver of the ego (see --ego and 'bridgegen list drivers')."""
+    """Default driver of the ego (see --ego and 'bridgegen list drivers'); storyboard: events of its
+    own move it, unless --ego names a driver."""
     others: Literal["attentive", "insistent", "lawful", "scripted"] = "scripted"
     """Default driver of the other participants (see --others, and their ``driver``)."""
     duration: Seconds
