@@ -21,6 +21,7 @@ _OF_FLAVOUR = {
     "video": {"evaluation", "size", "fps", "start", "end", "ego"},
     "page": {"scenarios", "ego"},
     "xosc": set[str](),
+    "osi": {"scenarios", "ego"},
 }
 """Options of the flavours that are no OpenSCENARIO of a run's scenarios."""
 
@@ -33,7 +34,7 @@ def export(
         typer.Argument(
             metavar="SOURCE",
             help="The folder of a run, or one .xosc file; several runs for parquet; an ontology "
-            "(.owl) for xosc.",
+            "(.owl) for xosc; also a recording for osi.",
         ),
     ],
     flavour: Annotated[
@@ -42,7 +43,8 @@ def export(
             help="1.2 or 1.3: with parameters; resolved: without; recorded: timed trajectories; "
             "carla: 1.0 for ScenarioRunner, timed trajectories for all but the ego; video: a film; "
             "page: one crash with its player and files as one page to send; parquet: all "
-            "evaluations as tables; xosc: OpenDRIVE and OpenSCENARIO of individuals.",
+            "evaluations as tables; osi: the motion as ASAM OSI in MCAP; xosc: OpenDRIVE and "
+            "OpenSCENARIO of individuals.",
             autocompletion=completing("flavour"),
         ),
     ],
@@ -115,7 +117,7 @@ def export(
     Scenarios each with their map. DuckDB, Polars and pandas read parquet files as one table. A film
     has the report's view, of the ego and the participant that it meets.
     """
-    from bridgegen.jobs.search.export import FLAVOURS
+    from bridgegen.jobs.search.export import FLAVOURS, export_traces
     from bridgegen.jobs.search.export import export as export_scenarios
     from bridgegen.jobs.search.report import write_finding_page
     from bridgegen.jobs.search.table import write_tables
@@ -148,6 +150,8 @@ def export(
             raise InputError("--flavour page takes one --scenario: one crash is sent in one page")
         name = scenarios[0] if scenarios else None
         written = [write_finding_page(sources[0], name, out, ego=ego)]
+    elif flavour == "osi":
+        written = export_traces(sources[0], out=out, notes=notes, **given)
     elif flavour == "xosc":
         written, notes = convert_file(sources[0], out)
     else:
@@ -214,7 +218,7 @@ def validate(
         list[str] | None,
         typer.Argument(
             metavar="FILE",
-            help="Files: .owl, .xodr, .xosc or .yaml; or drivers of your own: module:Class, "
+            help="Files: .owl, .xodr, .osc, .xosc or .yaml; or drivers of your own: module:Class, "
             "file.py:Class, file.py:function, file.fmu, connect:HOST:PORT, unix:PATH, "
             "'exec:COMMAND'.",
             show_default=False,
@@ -282,7 +286,14 @@ def validate(
 def _is_driver(text: str) -> bool:
     """Return whether a text names a driver, not a file to check."""
     path = Path(text)
-    if ":" not in text and path.suffix.lower() in (".owl", ".xodr", ".xosc", ".yaml", ".yml"):
+    if ":" not in text and path.suffix.lower() in (
+        ".owl",
+        ".xodr",
+        ".osc",
+        ".xosc",
+        ".yaml",
+        ".yml",
+    ):
         return False  # without what drivers import
     from bridgegen.drivers import DRIVERS, is_remote
     from bridgegen.drivers.planners import planners

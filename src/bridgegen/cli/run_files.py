@@ -246,7 +246,7 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
             return f"{move(path)}{colon}{what}"
         return str(move(value)) if value.endswith(".fmu") else value
     moved = str(move(value))
-    is_file = value.lower().endswith((*_YAML, ".xosc", ".csv"))
+    is_file = value.lower().endswith((*_YAML, ".osc", ".xosc", ".csv"))
     is_path = is_file or Path(value).is_dir() or Path(moved).is_dir()
     # A name of the catalogue stays a name, also in a file of another folder.
     return moved if key.name in _FILES and is_path else value

@@ -5,6 +5,7 @@ import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -251,15 +252,27 @@ def new(
     like: Annotated[
         str | None,
         typer.Option(
-            help="Start from a copy of this catalogue scenario.",
+            help="Start from a copy of this catalogue scenario, or from this OpenSCENARIO DSL file "
+            "(.osc), as YAML.",
             autocompletion=completing("scenario"),
+        ),
+    ] = None,
+    says: Annotated[
+        str | None,
+        typer.Option(
+            help="Start from a sentence in controlled English, such as 'a car cuts in 20 m ahead'; "
+            "prints each phrase beside its key, and refuses what is not understood."
         ),
     ] = None,
 ) -> None:
     """Write a commented scenario file to start from."""
     from bridgegen.scenario.language.starter import start_scenario
 
-    path = start_scenario(name, like=like)
+    path = start_scenario(name, like=like, says=says)
+    if says is not None:
+        _, *lines = path.read_text("utf-8").splitlines()  # the first one is for editors
+        head = takewhile(lambda line: line.startswith("# "), lines)
+        print(*(line.removeprefix("# ") for line in head), sep="\n")
     print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
 
 
@@ -309,7 +322,7 @@ def simulate(
     scenario: Annotated[
         str,
         typer.Argument(
-            help="An OpenSCENARIO file (.xosc); or a catalogue name or the path of a YAML file, of "
+            help="An OpenSCENARIO file (.xosc); or a catalogue name, a YAML or .osc file, of "
             "which one row is simulated.",
             autocompletion=completing("scenario"),
         ),
@@ -341,7 +354,9 @@ def simulate(
     trace: Annotated[
         Path | None,
         typer.Option(
-            help="A new .csv of every entity's time, x, y, h and speed.", rich_help_panel=OUTPUT
+            help="A new .csv of every entity's time, x, y, h and speed; or a new .mcap of ASAM "
+            "OSI: SensorView if its name ends in _sv.mcap, else GroundTruth.",
+            rich_help_panel=OUTPUT,
         ),
     ] = None,
     metrics: common.OnlyMetrics = None,
@@ -371,7 +386,9 @@ def simulate(
     stages = None if ideal is None else split(ideal)
     skipped: list[str] | None = [] if lenient else None
     file, runs = Path(scenario), common.read_simulator(simulator, simulator_set, connection)
-    is_logical = file.suffix.lower() in (".yaml", ".yml") or not (file.suffix or file.exists())
+    is_logical = file.suffix.lower() in (".yaml", ".yml", ".osc") or not (
+        file.suffix or file.exists()
+    )
     if is_logical or fix or distribution or odd:
         from bridgegen.jobs.search.model import simulate_scenario  # takes longer than a file
 
@@ -401,7 +418,7 @@ def simulate(
     for note in result.notes:
         print(f"bridgegen: note: {note}", file=sys.stderr)
     if trace is not None:
-        write_trace(trace, result.rollout)
+        write_trace(trace, result.rollout, around=result.around)
     if as_json:
         facts: dict[str, object] = {
             "file": str(file),

@@ -3,11 +3,13 @@
 The stages are the pipeline's, without imports of the search: this must start fast.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen import drivers as egos
 from bridgegen.assess import metrics as measures
@@ -36,6 +38,7 @@ from bridgegen.scenario.language.criteria import Criterion, joined
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+from bridgegen.simulation.osi.trace import Surroundings
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Incident, Rollout
 
 
@@ -59,6 +62,7 @@ class FileResult:
         unjudged: why the scenario says nothing of the ego: its traffic could not happen, or left no
             time to act from the start on; or the ego does not fail, and nothing happened, or its
             driver is not made for the scenario. "" if it does.
+        around: returns its map and its weather.
     """
 
     driver: str
@@ -72,6 +76,7 @@ class FileResult:
     cause: str | None = None
     notes: tuple[str, ...] = ()
     unjudged: str = ""
+    around: Callable[[], Surroundings] = field(default=Surroundings, repr=False, compare=False)
 
     @property
     def incidents(self) -> tuple[Incident, ...]:
@@ -129,7 +134,7 @@ def simulate_file(
         UnknownNameError: no such driver, vehicle, stage, metric or reading of empty triggers.
     """
     path = Path(path)
-    if path.suffix.lower() in (".yaml", ".yml"):
+    if path.suffix.lower() in (".yaml", ".yml", ".osc"):
         raise FileFormatError(
             f"{path}: one OpenSCENARIO file (.xosc) is simulated; a YAML file describes many "
             f"scenarios, of which 'bridgegen simulate' and bridgegen.model simulate one"
@@ -179,7 +184,19 @@ def simulate_file(
         parameters=embedded.parameters,
         cause=None if changes else _stated_cause(scenario),
         notes=(*warnings, *(f"{path}: {name}" for name in unknown), *embedded.program.notes),
+        around=partial(surroundings, embedded, roads, {}, rollout),
     ).unless(_outside(embedded, roads, network, rollout, path.stem))
+
+
+def surroundings(
+    embedded: EmbeddedSimulator,
+    roads: OpenDrive,
+    values: Mapping[str, npt.ArrayLike],
+    rollout: Rollout,
+) -> Surroundings:
+    """Return the map and the weather of a rollout, N = 1, of these values of the parameters."""
+    known = rollout.began.size or not rollout.event_names
+    return Surroundings(roads, embedded.weathers(values, rollout, 0) if known else ())
 
 
 def measured(

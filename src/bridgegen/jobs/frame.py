@@ -38,7 +38,7 @@ class Table(NamedTuple):
 
 def _named(value: Any) -> str:
     """Return how a command names a scenario: a file by its whole path."""
-    is_file = Path(value).suffix.lower() in (".yaml", ".yml", ".xosc")
+    is_file = Path(value).suffix.lower() in (".yaml", ".yml", ".osc", ".xosc")
     return str(Path(value).resolve()) if is_file else str(value)
 
 

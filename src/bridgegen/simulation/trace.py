@@ -1,10 +1,11 @@
-"""A rollout as a table that other programs read: one line per instant and entity."""
+"""A rollout as a table that other programs read: one line per instant and entity; or as OSI."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, StorageError
+from bridgegen.simulation.osi.trace import Surroundings, write_osi
 from bridgegen.simulation.rollout import Rollout
 
 COLUMNS = ("time", "entity", "x", "y", "h", "speed")
@@ -16,24 +17,36 @@ MORE = ("acceleration", "offset", "length", "width", "centre")
 the box [m] with its centre's distance ahead of the reference point."""
 
 
-def write_trace(path: Path, rollout: Rollout, row: int = 0) -> None:
-    """Write one scenario of a rollout as CSV, whole or not at all; every number in full.
+def write_trace(
+    path: Path,
+    rollout: Rollout,
+    row: int = 0,
+    around: Callable[[], Surroundings] = Surroundings,
+) -> None:
+    """Write one scenario of a rollout as CSV or OSI, whole or not at all; every number in full.
 
-    Its columns are `COLUMNS` and `MORE`; who is not present at an instant has no line then.
+    Columns of a table are `COLUMNS` and `MORE`; who is not present at an instant has no line then.
 
     Args:
-        path: a new file, its name ends in .csv.
+        path: a new file, its name ends in .csv, or in .mcap, see `write_osi`.
         rollout: N scenarios.
         row: which of them.
+        around: returns the map and the weather, for OSI.
 
     Raises:
-        InputError: the name does not end in .csv.
+        InputError: the name does not end so.
         StorageError: the file exists, or cannot be written.
     """
-    if path.suffix.lower() != ".csv":
-        raise InputError(f"{path}: a trace is a table, its name must end in .csv")
+    kind = path.suffix.lower()
+    if kind not in (".csv", ".mcap"):
+        raise InputError(
+            f"{path}: a trace is a table or ASAM OSI, its name must end in .csv or .mcap"
+        )
     if path.exists():
         raise StorageError(f"{path}: exists already, and is not overwritten")
+    if kind == ".mcap":
+        write_osi([path], rollout, around(), row)
+        return
     write_whole(path, (line.encode() for line in _lines(rollout, row)))
 
 

@@ -269,7 +269,7 @@ def _found_lines(found: "Triage") -> list[str]:
         )
         lines.append(f"How common: {share}; {space.measure}, 95 % confidence; not a rate on roads")
         if covered := covered_in_words(found):
-            lines.append(f"Found of it: of {space.rows} random scenarios, {covered}")
+            lines.append(f"Share found: of {space.rows} random scenarios, {covered}")
     simplest = [mode.minimal for mode in found.modes if mode.minimal is not None]
     if simplest:
         lines.append(f"Simplest: {simplest[0].sentence}")

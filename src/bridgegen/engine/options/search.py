@@ -362,8 +362,7 @@ class SearchOptions(CommonOptions):
         default=False,
         metadata=option(
             FLAG,
-            "Also estimate how likely harm and each failure mode is; ends early when both the "
-            "interval and the modes suffice (--set precision).",
+            "Also estimate how likely harm and each failure mode is; ends when that suffices.",
             before=False,
             group=SEARCH,
         ),

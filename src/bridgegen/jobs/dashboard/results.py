@@ -47,7 +47,7 @@ def scenario_name(text: str, project: Path, distribution: str = "") -> str:
         distribution: the file with its variations, if there is one: it names the scenario.
     """
     given = distribution or text
-    is_path = given.lower().endswith((".yaml", ".yml", ".xosc"))
+    is_path = given.lower().endswith((".yaml", ".yml", ".osc", ".xosc"))
     return place_of(given, project) if is_path else given
 
 

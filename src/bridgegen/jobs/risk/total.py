@@ -234,7 +234,7 @@ class TotalRisk:
             value, width, _ = text.interval(risk.probability(self.event))
             row = [name, rate, value, width, parts[0], f"{risk.weighted.evaluations:,}", parts[1]]
             rows.append(row)
-        head += ["simulations", f"{percent(MORE)} more narrow by"]
+        head += ["simulations", f"{percent(MORE)} more narrow it by"]
         at = 1 if unit else 2  # per encounter there is no rate of encounters
         return [head[0], *head[at:]], [[row[0], *row[at:]] for row in rows]
 

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib.resources import files as resources
@@ -19,7 +19,7 @@ from bridgegen.base.errors import (
 )
 from bridgegen.drivers.drivers import CODES, DRIVERS, SCRIPTED
 from bridgegen.drivers.noise import noise_key
-from bridgegen.engine.simulate import simulate_file
+from bridgegen.engine.simulate import FileResult, simulate_file
 from bridgegen.engine.stated import keyed
 from bridgegen.jobs.search.exported import FOLDER, MINIMAL
 from bridgegen.jobs.search.run import Run
@@ -35,6 +35,9 @@ from bridgegen.openx.openscenario.write import VERSIONS, least_version, to_versi
 from bridgegen.openx.prepared import logic_path, prepared, roads_of
 from bridgegen.openx.xml import read_bytes
 from bridgegen.simulation.embedded.compiler import compile_storyboard
+from bridgegen.simulation.osi.trace import ENDINGS, Surroundings, write_osi
+from bridgegen.simulation.recording import MAX_STATES
+from bridgegen.simulation.rollout import Rollout
 
 EXPORT = "export"
 
@@ -99,6 +102,75 @@ def export(
     beside = {folder / name: data() for name, data in _BESIDE.get(flavour, {}).items()}
     _write(beside, folder, ())
     return [*found, *beside]
+
+
+OSI = "osi"
+
+
+def export_traces(
+    source: Path,
+    *,
+    scenarios: Sequence[str] = (),
+    out: Path | None = None,
+    ego: str | None = None,
+    notes: list[str] | None = None,
+) -> list[Path]:
+    """Write motion as ASAM OSI: a GroundTruth and a SensorView file of each scenario or recording.
+
+    Args:
+        source: the folder of a run, or one ``.xosc`` file, simulated in the embedded simulator;
+            or a recording of a format that `bridgegen.recordings.readers` knows.
+        scenarios: names of a run's scenarios; all but the minimal ones by default.
+        out: the folder to write to; ``export/osi`` in the run's or the file's by default.
+        ego: the driver of the ego; the files' by default.
+        notes: takes a sentence for what a recording leaves open.
+
+    Returns:
+        The files written.
+
+    Raises:
+        BridgeGenError: as `export`; or scenarios or a driver are chosen of a recording, or one is
+            too large or of no known format.
+    """
+    traces: Iterable[tuple[str, Rollout, Surroundings]]
+    if source.is_dir() or source.suffix.lower() == ".xosc":
+        chosen = _chosen(source, scenarios)
+        results = ((path.stem, _simulated(path, ego)) for path in chosen)
+        traces = ((name, result.rollout, result.around()) for name, result in results)
+    elif scenarios or ego is not None:
+        raise InputError(f"{source}: is a recording, of which no scenario or driver is chosen")
+    else:
+        traces = _of_recording(source, [] if notes is None else notes)
+    folder = out or (source if source.is_dir() else source.parent) / EXPORT / OSI
+    written: list[Path] = []
+    for name, rollout, around in traces:
+        _write({}, folder, ())
+        paths = [folder / f"{name}{ending}" for ending in ENDINGS.values()]
+        write_osi(paths, rollout, around)
+        written += paths
+    return written
+
+
+def _of_recording(path: Path, notes: list[str]) -> Iterator[tuple[str, Rollout, Surroundings]]:
+    """Yield name and motion of each recording in a file; its ego is who is there longest."""
+    from bridgegen.recordings.excerpt import clock_of, excerpt
+    from bridgegen.recordings.readers.clean import clean
+    from bridgegen.recordings.readers.formats import read as read_recordings
+
+    for number, recorded_traffic in enumerate(read_recordings(path), 1):
+        traffic = clean(recorded_traffic, recorded_traffic.facts.time_step).traffic
+        clock = clock_of(traffic)
+        begin, end, count = int(clock.begin.min()), int(clock.end.max()), len(traffic.names)
+        if (states := (end - begin + 1) * count) > MAX_STATES:
+            raise InputError(
+                f"{path}: a recording may have {MAX_STATES:,} instants times participants, got "
+                f"{states:,}"
+            )
+        ego = int(np.argmax(clock.end - clock.begin))
+        others = [p for p in range(count) if p != ego]
+        name = path.stem if number == 1 else f"{path.stem}-{number}"
+        notes.append(f"{path}: the host vehicle of {name} is '{traffic.names[ego]}'; no map")
+        yield name, excerpt(traffic, clock, ego, others, begin, end), Surroundings()
 
 
 def _ignored_drivers(path: Path, flavour: str) -> list[str]:
@@ -231,12 +303,16 @@ def _recorded(scenario: osc.OpenScenario, path: Path, ego: str | None) -> osc.Op
     return recorded(_resolved(scenario, path), _recording(path, ego))
 
 
-def _recording(path: Path, ego: str | None) -> Recording:
-    """Return what the embedded simulator records of a file until it stops."""
+def _simulated(path: Path, ego: str | None) -> FileResult:
     result = simulate_file(path, ego=ego)
     if result.status != "ok":
         raise InputError(f"{path}: its simulation must succeed to be recorded: {result.status}")
-    rollout = result.rollout
+    return result
+
+
+def _recording(path: Path, ego: str | None) -> Recording:
+    """Return what the embedded simulator records of a file until it stops."""
+    rollout = _simulated(path, ego).rollout
     n = rollout.n_steps[0]
     x, y, h, v = (array[0, :, :n] for array in (rollout.x, rollout.y, rollout.h, rollout.v))
     return Recording(

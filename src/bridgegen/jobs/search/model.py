@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from bridgegen.base.extras import require
 from bridgegen.engine.domain import outside
 from bridgegen.engine.options import CommonOptions, called_with
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.engine.simulate import FileResult, measured, result_of
+from bridgegen.engine.simulate import FileResult, measured, result_of, surroundings
 from bridgegen.jobs.search.restored import placed
 from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load, within
 from bridgegen.pages.sketch import sketch
@@ -97,8 +98,12 @@ def simulate_scenario(
     # Not the row of the space's defaults: that is moved into its limits, by rounding errors.
     x = space.row(space.fixed)
     rollout = pipeline.rollout(x[np.newaxis])
+    ((_, of_row),) = runner.by_variant(x[np.newaxis])
+    roads = of_row.source.roads(of_row.space.values(x))
+    columns = of_row.columns(x[np.newaxis])
     return replace(
         result_of(rollout, names, driver, pipeline.monitor, may_stop=pipeline.is_protocol),
+        around=partial(surroundings, of_row.embedded, roads, columns, rollout),
         parameters=runner.facts(x),
         notes=(*pipeline.scenario.notes, *runner.notes),
     ).unless("" if rollout.status[0] else outside(runner))

@@ -35,7 +35,7 @@ STORYBOARD = ".xosc"
 
 def is_file(scenario: str | Path) -> bool:
     """Say whether a scenario is named by the path of its file."""
-    return Path(scenario).suffix.lower() in (".yaml", ".yml", STORYBOARD)
+    return Path(scenario).suffix.lower() in (".yaml", ".yml", reader.DSL, STORYBOARD)
 
 
 def load(

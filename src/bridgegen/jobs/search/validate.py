@@ -5,10 +5,11 @@ Each kind of file imports what checks it: a map needs neither the simulator nor 
 
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bridgegen.base.errors import BridgeGenError, InputError
+from bridgegen.base.errors import BridgeGenError, InputError, UnsupportedError
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
 from bridgegen.scenario.ontology import reasoner
@@ -28,7 +29,7 @@ PLACEHOLDERS = (
 def validate_file(
     path: Path, *, reason: bool = False, warnings: list[str] | None = None
 ) -> list[str]:
-    """Return the problems of an ``.owl``, ``.xodr``, ``.xosc`` or ``.yaml`` file.
+    """Return the problems of an ``.owl``, ``.xodr``, ``.osc``, ``.xosc`` or ``.yaml`` file.
 
     An ``.owl`` of a scenario of the catalogue is checked against that scenario's constraints. An
     ``.xosc`` is checked with the map that it names, one with a distribution with its scenario. A
@@ -39,7 +40,8 @@ def validate_file(
         path: the file.
         reason: run the reasoner on an ``.owl``, too, for consistency.
         warnings: takes what is odd about an ``.xodr`` or ``.xosc`` that can be imported, searched
-            or simulated all the same; by default, that is a problem, too.
+            or simulated all the same, and why an ``.osc`` in good order cannot be searched; by
+            default, that is a problem, too.
 
     Raises:
         InputError: a file of another kind, or the reasoner is not installed.
@@ -49,6 +51,7 @@ def validate_file(
     kinds = {
         ".owl": _ontology,
         ".xodr": lambda file: _roads(file, warnings),
+        ".osc": lambda file: _dsl(file, warnings),
         ".xosc": lambda file: _storyboard(file, warnings),
         ".yaml": _logical,
         ".yml": _logical,
@@ -70,12 +73,16 @@ def notes_on(path: Path) -> list[str]:
     That its name is not the scenario's, that texts of the template still stand in it, and that a
     participant indicates to one side only and changes lane to the other only.
     """
-    if path.suffix.lower() not in (".yaml", ".yml"):
+    if path.suffix.lower() not in (".yaml", ".yml", ".osc"):
         return []
     from bridgegen.scenario.exposure.reader import is_exposure
     from bridgegen.scenario.language.reader import load as load_scenario
     from bridgegen.scenario.language.reader import read_document
 
+    if path.suffix.lower() == ".osc":
+        with suppress(UnsupportedError):  # a warning already
+            return list(load_scenario(path).notes)
+        return []
     if is_exposure(read_document(path)):
         return []
     scenario = load_scenario(path)
@@ -169,6 +176,19 @@ def _storyboard(path: Path, warnings: list[str] | None) -> list[str]:
     return problems
 
 
+def _dsl(path: Path, warnings: list[str] | None) -> list[str]:
+    from bridgegen.scenario.language.dsl.names import Names
+
+    Names(path).stop()
+    try:
+        return _logical(path)
+    except UnsupportedError as error:  # in good order, but nothing that can be searched
+        if warnings is None:
+            raise
+        warnings += [f"it cannot be searched: {problem}" for problem in error.problems]
+        return []
+
+
 def _logical(path: Path) -> list[str]:
     from bridgegen.engine.pipeline import Pipeline
     from bridgegen.jobs.search.exportable import CHECKED_BY_VALIDATE, require_exportable
@@ -176,7 +196,7 @@ def _logical(path: Path) -> list[str]:
     from bridgegen.scenario.language.reader import load as load_scenario
     from bridgegen.scenario.language.reader import read_document
 
-    if is_exposure(read_document(path)):
+    if path.suffix.lower() != ".osc" and is_exposure(read_document(path)):
         read_exposure(path)
         return []
     scenario = load_scenario(path)

@@ -13,7 +13,7 @@ from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
 from bridgegen.results.failures import FailureFile, failure_of
 from bridgegen.scenario.language.parameters import nearest
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES
-from bridgegen.scenario.language.reader import entry_names, load, pack_names
+from bridgegen.scenario.language.reader import DSL, entry_names, load, pack_names
 from bridgegen.scenario.language.reader import names as catalogue_names
 
 MOST_FILES = 100_000
@@ -187,17 +187,19 @@ def _files(folder: Path) -> Iterable[Path]:
         if again and not again.isdisjoint(path.parents):
             continue
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
-        if path.suffix.lower() in (*_YAML, _STORYBOARD) and not hidden and path.is_file():
+        if path.suffix.lower() in (*_YAML, DSL, _STORYBOARD) and not hidden and path.is_file():
             found.append(path)
     return found
 
 
 def _entry(path: Path) -> Entry | None:
     """Return the entry of a file; None if it is none."""
-    if path.suffix.lower() in _YAML:
+    if path.suffix.lower() in (*_YAML, DSL):
         with path.open("rb") as file:
             head = file.read(MAX_BYTES)
-        is_scenario = any(line.startswith(b"scenario:") for line in head.splitlines())
+        # Of DSL, files with declarations alone are imported by others.
+        key = b"scenario " if path.suffix.lower() == DSL else b"scenario:"
+        is_scenario = any(line.startswith(key) for line in head.splitlines())
         return Entry(path.stem, str(path)) if is_scenario else None
     if path.suffix.lower() != _STORYBOARD:
         return None

@@ -58,12 +58,14 @@ class Document:
         lines: the line of each entry, by its path from the root: ``("parameters", "ego_speed")``.
         place: the file, for messages.
         scalars: where the values stand, by path.
+        notes: what a reader of the file should know, a sentence each.
     """
 
     data: object
     lines: dict[Path, int]
     place: str
     scalars: Mapping[Path, Scalar] = field(default_factory=dict, repr=False)
+    notes: tuple[str, ...] = ()
 
     def at(self, path: Path) -> str:
         """Return file and line of an entry, or of the nearest one around it."""

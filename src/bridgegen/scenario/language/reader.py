@@ -50,6 +50,9 @@ from bridgegen.scenario.language.story import Story
 from bridgegen.scenario.language.storyboard import Storyboard, read_recorded
 from bridgegen.scenario.language.tables import PackTable, read_table
 
+DSL = ".osc"
+"""Ending of the names of OpenSCENARIO DSL files."""
+
 _PREFIX = re.compile(r"[a-z][a-z0-9_]{0,30}_")
 
 
@@ -119,7 +122,7 @@ def load(name_or_path: str | Path) -> LogicalScenario:
 
     Args:
         name_or_path: a name of the catalogue or of a pack ("r157/cut-in"), or the path of a file
-            (ends in .yaml or .yml).
+            (ends in .yaml, .yml or, OpenSCENARIO DSL, .osc).
 
     Raises:
         UnknownNameError: no such name in the catalogue or the packs.
@@ -154,6 +157,10 @@ def document_of(name_or_path: str | Path) -> tuple[Document, Path | None]:
     """
     text = str(name_or_path)
     path = Path(text)
+    if path.suffix.lower() == DSL:
+        from bridgegen.scenario.language.dsl.story import read_dsl
+
+        return read_dsl(path), path.parent
     is_path = isinstance(name_or_path, Path) or path.suffix in (".yaml", ".yml")
     # A name with a slash is a pack's only where there is such a pack; any other one is a path, and
     # the message says that the file is missing.
@@ -339,6 +346,13 @@ class _Declarations:
                 f"parameters.{name}.default must be {kind.expected()}, got {given.default!r}"
                 f"{at(place)}"
             )
+        if given.only is not None:
+            low = high = default
+            if not kind.names or kind.read(given.only, low, high) != default:
+                raise ScenarioError(
+                    f"parameters.{name}.only must be the default of a category, got {given.only!r}"
+                    f"{at(place)}"
+                )
         self.parameters.append(
             Parameter(
                 self._prefix + name,
@@ -537,7 +551,7 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
         road_end=given.road_end,
         roads=roads,
         story=story,
-        driver=given.driver,
+        driver="" if given.driver == "storyboard" else given.driver,
         effects=tuple(effect.function for effect in given.effects),
         axes=read_axes(given.axes),
         parameters=parameters,
@@ -550,6 +564,7 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
         recorded=recorded,
         domain=document.below("odd") if given.odd else None,
         exposure=document.below("exposure") if given.exposure is not None else None,
+        notes=document.notes,
     )
     try_out(scenario)
     return scenario

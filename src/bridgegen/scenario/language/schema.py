@@ -158,6 +158,8 @@ class ParameterSection(ShapedSection):
     """Largest value, in the parameter's unit; of an angle, it may be less than the smallest."""
     values: Annotated[list[Text], Field(min_length=2)] | None = None
     """Names of a category's values."""
+    only: Text | None = None
+    """The one value of a category that it has here; by default it may have any."""
     default: NumberOrName
     """Value of the parameter while its axis is not searched."""
     description: Text
@@ -285,7 +287,8 @@ class ScenarioFile(ShapedSection):
     """Country by whose law it is judged, see docs/conflicts.md; German law by default, or on the
     left its mirror image."""
     driver: Word = "route-follower"
-    """Default driver of the ego (see --ego and 'bridgegen list drivers')."""
+    """Default driver of the ego (see --ego and 'bridgegen list drivers'); storyboard: events of its
+    own move it, unless --ego names a driver."""
     others: Literal["attentive", "insistent", "lawful", "scripted"] = "scripted"
     """Default driver of the other participants (see --others, and their ``driver``)."""
     duration: Seconds

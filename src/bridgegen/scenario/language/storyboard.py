@@ -129,6 +129,10 @@ class Storyboard:
         self._places, self._choices = Places(quantities, roads), Choices(quantities)
         self._report, self._check = quantities.report, quantities.check
         document = quantities.document
+        # Whether the scenario's own events move the ego, as it has no driver of its own.
+        self._by_file = (
+            isinstance(document.data, dict) and document.data.get("driver") == "storyboard"
+        )
         self.known = [str(name) for name, _ in entries(document, "participants")] + list(more)
         self._events_read = list(entries(document, "events"))
         self._event_names = [str(name) for name, _ in self._events_read]
@@ -144,7 +148,7 @@ class Storyboard:
     def _participants(self) -> Iterator[Participant]:
         if EGO not in self.known:
             self._report("participants must hold 'ego', the system under test", ("participants",))
-        elif len(self.known) < 2:
+        elif len(self.known) < 2 and not self._by_file:
             self._report("participants must hold another one besides the ego", ("participants",))
         for key, data in entries(self._quantities.document, "participants"):
             name, path = str(key), ("participants", key)
@@ -634,7 +638,9 @@ class Storyboard:
             if given.participant is not None:
                 self._check_participant(given.participant, (*path, "participant"))
                 acting = self._acting.get(given.participant)
-                if given.participant == EGO or (acting and acting.driver == EGO):
+                if (given.participant == EGO and not self._by_file) or (
+                    acting and acting.driver == EGO
+                ):
                     self._report("events move the others; the ego's driver is under test", path)
             when = tuple(
                 tuple(self._conditions(given, condition_section, (*path, "when", number)))
@@ -763,7 +769,7 @@ class Storyboard:
                 (*path, "lane_change"),
             )
             actor = self._acting.get(str(given.participant))
-            if actor is not None and (actor.end is not None or actor.path):
+            if actor is not None and actor.name != EGO and (actor.end is not None or actor.path):
                 self._report(f"{actor.name} changes lane, so it has no end and no path", path)
             if actor is not None and PARTICIPANTS[actor.type].on_rails:
                 self._report(

@@ -174,7 +174,16 @@ def build(
     add_perception(builder, story)
     if odd:
         put(builder.iri(EGO), "has_odd", odd)
+    own = {event.name for event in story.events if event.participant == EGO}
     for event in story.events:
+        if driver and event.participant == EGO:
+            continue  # the driver decides
+        for condition in (each for conditions in event.when for each in conditions):
+            if driver and condition.event in own:
+                raise InputError(
+                    f"event '{event.name}' waits for '{condition.event}' of the ego, which "
+                    f"{driver} drives ({scenario.place})"
+                )
         put(top, "has_event", add_event(builder, event, declared, place))
     for name, course in (courses or {}).items():
         put(top, "has_event", add_course(builder, name, course))

@@ -92,7 +92,7 @@ def add_participant(
         put(node, "has_reason_off_crosswalk", participant.off_crosswalk)
     _add_body(builder, node, participant.body)
     driver = driver if name == EGO else participant.driver
-    if name == EGO or driver in (*LOOKING, EGO):
+    if (name == EGO and driver) or driver in (*LOOKING, EGO):
         controller = builder.node(f"{name}_controller", "Controller")
         put(controller, "has_name", f"{name}_driver")
         put(controller, "has_driver", driver)

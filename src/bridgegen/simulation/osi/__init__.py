@@ -1,0 +1,1 @@
+"""Rollouts as traces of ASAM OSI: GroundTruth or SensorView in MCAP files."""
