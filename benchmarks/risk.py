@@ -121,11 +121,36 @@ def problems() -> ModuleType:
     return module
 
 
-def of_rate(problem: Any, seed: int, budget: int) -> Frequency:
-    """Return what a search with rates says of an analytic problem."""
+class Cheap:
+    """A screen of an analytic problem, that is wrong: a `Screen`.
+
+    It takes each score for another one, which depends on two others; it is off by half a standard
+    deviation; and it knows of nothing where the first score is negative.
+    """
+
+    name = "cheap"
+
+    def __init__(self, problem: Any, road: Any, each: int, budget: int) -> None:
+        self.evaluations, self.budget, self.each = 0, each * budget, float(each)
+        self._problem, self._road = problem, road
+
+    def evaluate(self, U: Any) -> tuple[Results, Any]:
+        """See `Screen`."""
+        there = np.arange(self.evaluations, self.evaluations + len(U)) < self.budget
+        self.evaluations = min(self.evaluations + len(U), self.budget)
+        Z = self._road.normal(U)
+        score = self._problem.score(0.85 * Z + 0.5 * np.sin(2.0 * np.roll(Z, 1, axis=1))) + 0.5
+        score = np.where(Z[:, 0] < 0.0, -3.0, score)
+        found = Results.of_F(-score[:, np.newaxis], there)
+        return replace(found, critical=(score >= 0.0) & there), there
+
+
+def of_rate(problem: Any, seed: int, budget: int, each: int = 0) -> Frequency:
+    """Return what a search with rates says of an analytic problem, beside a screen or alone."""
     road = problems().AnalyticRoad(problem)
     names = tuple(f"x{k}" for k in range(problem.dimensions))
-    algorithm = Rate(Problem(names, road=road), seed)
+    screen = Cheap(problem, road, each, budget) if each else None
+    algorithm = Rate(Problem(names, road=road, screen=screen), seed)
     score = np.empty(0)
     while len(score) < budget:
         U = algorithm.ask()
@@ -393,7 +418,7 @@ def rates(folder: Path, pairs: list[str], seeds: int, budget: int) -> None:
             print(f"| {' | '.join(cells)} |", flush=True)
 
 
-def known(repeats: int, budget: int) -> None:
+def known(repeats: int, budget: int, each: int) -> None:
     """Print how often intervals of ``search --rate`` hold the truth, on analytic problems."""
     made = problems()
     cases = {
@@ -407,7 +432,7 @@ def known(repeats: int, budget: int) -> None:
         problem, ratios, sides, widths = make(), [], [], []
         p = problem.probability
         for seed in range(repeats):
-            found = of_rate(problem, seed, budget)
+            found = of_rate(problem, seed, budget, each)
             if found.estimate is not None:
                 ratios.append(found.estimate / p)
                 sides.append((found.high < p, found.low > p))
@@ -440,6 +465,7 @@ def main() -> None:
     sure = parts.add_parser("known")
     sure.add_argument("--repeats", type=int, default=200)
     sure.add_argument("--budget", type=int, default=600)
+    sure.add_argument("--screen", type=int, default=0)
     sums = parts.add_parser("total")
     sums.add_argument("--repeats", type=int, default=200)
     sums.add_argument("--budget", type=int, default=30_000)
@@ -453,7 +479,7 @@ def main() -> None:
     elif given.what == "rate":
         rates(given.folder, given.pairs, given.seeds, given.budget)
     elif given.what == "known":
-        known(given.repeats, given.budget)
+        known(given.repeats, given.budget, given.screen)
     elif given.what == "total":
         total(given.repeats, given.budget)
     elif given.what == "near-misses":

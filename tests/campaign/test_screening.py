@@ -114,6 +114,28 @@ def test_an_interrupted_search_becomes_the_same(stop_after, tmp_path):
     assert again.notes == whole.notes
 
 
+def test_with_rates_models_see_it_and_both_are_counted(tmp_path):
+    """Stopped and resumed, it is the same run."""
+    given = {"algorithm": "rate", "screen_budget": 480, "settings": {"initial": 12, "batch": 6}}
+    whole = search(tmp_path / "whole", 24, triage="none", **given)
+    told = whole.screened
+    assert (whole.settings.screen_batch, told.screen_budget) == (None, 480)
+    assert 430 < told.screen_evaluations <= 480
+    assert told.compared == whole.summary.evaluations == 24
+    assert told.both + told.simulator_only == whole.summary.critical
+
+    def stop(progress):
+        if progress.evaluations >= 18:
+            raise KeyboardInterrupt
+
+    with suppress(Interrupted):
+        search(tmp_path / "part", 24, callbacks=SearchCallbacks(batch=stop), triage="none", **given)
+    again = bg.resume(tmp_path / "part", deliver=False)
+    assert rows(whole.folder) == rows(again.folder)
+    assert again.notes == whole.notes
+    assert "--screen-batch" not in whole.settings.command(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

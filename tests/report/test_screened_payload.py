@@ -25,7 +25,7 @@ def space():
 
 def test_every_figure_is_said(space):
     assert sentences(FOUND) == [
-        "embedded proposed, with 5,923 of 6,000 evaluations; 300 scenarios ran in both simulators.",
+        "embedded made 5,923 of 6,000 evaluations; 300 scenarios ran in both simulators.",
         "Of 50 that are critical in embedded, 40 are critical in esmini; of 250 others, 2.",
         "Rank correlation of the objectives: 0.81.",
         "Critical in embedded only: 8 in the first half of them, 2 in the second.",

@@ -1,6 +1,7 @@
 """A search with rates: the chances that it states are those with which it draws."""
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,10 +34,28 @@ def problems():
     return module
 
 
-def searched(problems, problem, seed, budget):
+class Cheap:
+    """A screen that takes every third point for another one, and fails at some."""
+
+    name, each, evaluations = "cheap", 6.0, 0
+
+    def __init__(self, problem, road, budget):
+        self.budget, self.score, self.road = budget, problem.score, road
+
+    def evaluate(self, U):
+        there = np.arange(self.evaluations, self.evaluations + len(U)) < self.budget
+        self.evaluations += int(there.sum())
+        Z = self.road.normal(U)
+        score = self.score(np.where(np.sin(9.0 * Z[:, :1]) > 0.5, -Z, Z))
+        plain = Results.of_F(-score[:, np.newaxis], there & (Z[:, 2] > -1.0))
+        return replace(plain, critical=(score >= 0.0) & plain.ok), there
+
+
+def searched(problems, problem, seed, budget, screened=False):
     """Return what was drawn, and which rows are harmful."""
     road = problems.AnalyticRoad(problem)
-    search = Rate(Problem(("a", "b", "c"), road=road), seed, initial=20, batch=20)
+    screen = Cheap(problem, road, 6 * budget) if screened else None
+    search = Rate(Problem(("a", "b", "c"), road=road, screen=screen), seed, initial=20, batch=20)
     harmful = np.empty(0, np.bool_)
     while len(harmful) < budget:
         U = search.ask()
@@ -44,17 +63,19 @@ def searched(problems, problem, seed, budget):
         plain = Results.of_F(-score[:, np.newaxis])
         search.tell(U, Results(plain.F, plain.ok, score >= 0.0, plain.metrics, plain.cause))
         harmful = np.append(harmful, score >= 0.0)
+    assert screen is None or 5 * budget < screen.evaluations <= screen.budget
     return search.draws, harmful
 
 
-def test_whatever_the_model_estimates_are_unbiased(problems, monkeypatch):
+@pytest.mark.parametrize("screened", [False, True])
+def test_whatever_the_model_estimates_are_unbiased(screened, problems, monkeypatch):
     monkeypatch.setattr(searching, "POOL", 128)
     # A half space in a case of 30 %; sums of rarer events are too skewed for 30 seeds.
     score = problems.discrete(0.3).score
     problem = problems.Analytic(3, lambda Z: score(Z) + 1.0, 0.3 * problems.normal.sf(1.0))
     sums, ones = [], []
     for seed in range(30):
-        draws, harmful = searched(problems, problem, seed, 80)
+        draws, harmful = searched(problems, problem, seed, 80, screened)
         sums.append(row_weights(draws)[harmful].sum())
         ones.append(draws.weights.mean())
     for values, truth in ((sums, problem.probability), (ones, 1.0)):
@@ -67,7 +88,7 @@ def test_densities_of_an_exposure_are_those_of_its_pools(monkeypatch):
     road = OnRoad(read_exposure(EXAMPLE, scenario), space)
     search = Rate(Problem(space.variables, road=road), 0)
     for _ in range(2):  # without and with points near failures
-        pools = [search._pool() for _ in range(12)]
+        pools = [search._pool(1) for _ in range(12)]
         for name in ("road", "even"):
             means = [getattr(pool, name).sum() / pool.size for pool in pools]
             assert abs(np.mean(means) - 1.0) < 4.0 * np.std(means) / np.sqrt(12) + 0.02
@@ -119,9 +140,11 @@ def test_a_rate_is_the_same_after_a_stop(tmp_path, cli, same_rows):
 def test_what_cannot_be_rated_is_refused(tmp_path):
     with refuses(InputError, "--rate", "pso"):
         run_search("cut-in", rate=True, algorithm="pso", out=tmp_path / "a")
-    screen = {"simulator": "esmini", "screen": "embedded"}
-    with refuses(InputError, "--rate", "--screen"):
-        run_search("cut-in", rate=True, out=tmp_path / "a", **screen)
+    screen = {"simulator": "esmini", "screen": "embedded", "budget": 10}
+    with refuses(InputError, "--screen-batch", "screen_budget"):
+        run_search(
+            "cut-in", rate=True, out=tmp_path / "a", screen_batch=4, screen_budget=190, **screen
+        )
     with refuses(InputError, "gap"):
         run_search("cut-in", exposure=EXAMPLE, fixed={"gap": 30.0}, out=tmp_path / "a")
     with refuses(InputError, "crossroads-s1"):

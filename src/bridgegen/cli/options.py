@@ -82,7 +82,7 @@ Screen = Annotated[
     str | None,
     typer.Option(
         help="Cheap simulator (low fidelity) beside a slow one, in which the algorithm searches "
-        "for what the simulator evaluates; not with --rate.",
+        "for what the simulator evaluates; with --rate, models learn what it is worth.",
         show_default="none",
         rich_help_panel=SIMULATOR,
         autocompletion=completing("simulator"),

@@ -14,8 +14,8 @@ def sentences(found: Agreement) -> list[str]:
     """Return what both simulators did and in what they agree, a sentence each."""
     screen, simulator = found.screen, found.simulator
     said = [
-        f"{screen} proposed, with {found.screen_evaluations:,} of {found.screen_budget:,} "
-        f"evaluations; {found.compared:,} scenarios ran in both simulators."
+        f"{screen} made {found.screen_evaluations:,} of {found.screen_budget:,} evaluations; "
+        f"{found.compared:,} scenarios ran in both simulators."
     ]
     if found.ended_after is not None:
         said.append(

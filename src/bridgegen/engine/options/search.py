@@ -459,7 +459,7 @@ class SearchOptions(CommonOptions):
         metadata=option(
             SCREEN,
             "Cheap simulator (low fidelity) beside a slow one, in which the algorithm searches "
-            "for what the simulator evaluates; not with --rate.",
+            "for what the simulator evaluates; with --rate, models learn what it is worth.",
             shown="none",
             before=None,
             group=OF_SIMULATOR,
@@ -471,7 +471,7 @@ class SearchOptions(CommonOptions):
         metadata=option(
             WHOLE,
             "Number of evaluations in the screen, at most.",
-            shown="20 for each evaluation",
+            shown="20 for each evaluation; with --rate 100",
             limits=(1, MAX_BUDGET),
             before=None,
             group=OF_SIMULATOR,
@@ -482,7 +482,7 @@ class SearchOptions(CommonOptions):
         metadata=option(
             WHOLE,
             "Number of evaluations that are chosen at a time, with a screen: a multiple of the "
-            "number of workers keeps all of them busy.",
+            "number of workers keeps all of them busy; not with --rate.",
             shown="8",
             limits=(1, MAX_BUDGET),
             before=None,

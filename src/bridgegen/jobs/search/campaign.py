@@ -43,7 +43,7 @@ from bridgegen.jobs.search.scenarios import (
     refuse_standstill,
     within,
 )
-from bridgegen.jobs.search.screening import BATCH, require_screen, screen_budget
+from bridgegen.jobs.search.screening import require_screen, screen_batch, screen_budget
 from bridgegen.jobs.search.searcher import (
     FailingDriver,
     Suffices,
@@ -144,10 +144,10 @@ def run_search(given: SearchArguments) -> Run:
     seed = catalogue.seed if given.seed is None else given.seed
     if problems := range_problems(replace(given, budget=budget, seed=seed)):
         raise InputError(*problems)
-    require_screen(given, budget)
     effort(given.triage)
     # Before anything else depends on it: the run records the algorithm that `auto` stands for.
     given = _with_algorithm(given, catalogue, budget)
+    require_screen(given, budget)
     method = toolkit.get(given.algorithm)
     require_asynchronous(given, method)
     columns = columns_of(method, given.objectives)
@@ -212,7 +212,7 @@ def run_search(given: SearchArguments) -> Run:
             settings=values,
             budget=budget,
             screen_budget=own_budget,
-            screen_batch=None if given.screen is None else given.screen_batch or BATCH,
+            screen_batch=screen_batch(given),
             seed=seed,
             ego=pipeline.driver.name,
             driver_digest=digest_of(pipeline.driver.name),
@@ -478,11 +478,6 @@ def _with_algorithm(
             )
         given = replace(given, algorithm=RATE)
     if given.algorithm == RATE:
-        if given.screen is not None:
-            raise InputError(
-                "--rate needs the chance of each row, which is not known of rows that a screen "
-                "proposes: leave out --screen"
-            )
         return replace(given, rate=True)
     if given.algorithm != AUTO:
         return given

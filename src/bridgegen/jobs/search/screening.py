@@ -17,6 +17,10 @@ BATCH = 8
 EACH = 20
 """Default number of rows of the screen for each row of the run's simulator."""
 
+EACH_RATED, LEAST_EACH = 100, 20
+"""Default and least number of them in a search with rates. Each batch is drawn of a pool of so many
+points for each row: rows of a small pool are not independent, and intervals are too narrow."""
+
 
 def require_screen(given: SearchOptions, budget: int) -> None:
     """Check the options of a screen.
@@ -44,6 +48,18 @@ def require_screen(given: SearchOptions, budget: int) -> None:
             "the screen proposes every evaluation, so screen_budget >= budget must hold, got "
             f"{given.screen_budget} and {budget} (--screen-budget, --budget)"
         )
+    if given.screen is not None and given.rate:
+        if given.screen_batch is not None:
+            problems.append(
+                "--screen-batch is for a search without rates (--rate), whose batches are those of "
+                f"its algorithm (--set batch), got {given.screen_batch}"
+            )
+        if given.screen_budget is not None and given.screen_budget < LEAST_EACH * budget:
+            problems.append(
+                "--rate draws its rows from those that the screen has evaluated, so screen_budget "
+                f">= {LEAST_EACH} * budget must hold, got {given.screen_budget} and {budget} "
+                "(--screen-budget, --budget)"
+            )
     if problems:
         raise InputError(*problems)
 
@@ -60,31 +76,37 @@ def screen_budget(given: SearchOptions, budget: int) -> int | None:
     """Return the screen's budget, given or default; None without a screen."""
     if given.screen is None or given.screen_budget is not None:
         return given.screen_budget
-    return min(EACH * budget, MAX_BUDGET)
+    return min((EACH_RATED if given.rate else EACH) * budget, MAX_BUDGET)
+
+
+def screen_batch(given: SearchOptions) -> int | None:
+    """Return the number of rows that are chosen at a time; None without a screen, or with rates."""
+    return None if given.screen is None or given.rate else given.screen_batch or BATCH
 
 
 class Screen:
-    """See `bridgegen.search.screened.Screen`.
+    """See `bridgegen.search.algorithms.algorithm.Screen`.
 
     Args:
         pipeline: of the scenario in the screen's simulator, its objective chosen.
         name: of the simulator.
         budget: maximum number of evaluations.
+        rows: evaluations of the run.
     """
 
-    def __init__(self, pipeline: Pipeline, name: str, budget: int) -> None:
-        self.name, self.budget = name, budget
+    def __init__(self, pipeline: Pipeline, name: str, budget: int, rows: int) -> None:
+        self.name, self.budget, self.each = name, budget, budget / rows
         self._pipeline = pipeline
         self._known = KnownRows()
         self._log = ResultLog(pipeline.objective.n_obj, len(pipeline.metrics))
 
     @property
     def evaluations(self) -> int:
-        """See `bridgegen.search.screened.Screen`."""
+        """See `bridgegen.search.algorithms.algorithm.Screen`."""
         return len(self._known)
 
     def evaluate(self, U: Float) -> tuple[Results, Bool]:
-        """See `bridgegen.search.screened.Screen`."""
+        """See `bridgegen.search.algorithms.algorithm.Screen`."""
         space = self._pipeline.space
         X = as_float("X", space.decode(U), (len(U), len(space.names))) + 0.0
         ids, fresh = self._known.add(X, self.budget)

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -23,7 +24,7 @@ from bridgegen.scenario.exposure.road import OnRoad
 from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Arena, Problem, asynchronous, resolve
 from bridgegen.search.algorithms.rate import Rate
-from bridgegen.search.screened import Screened
+from bridgegen.search.screened import Screened, ScreenedRate
 from bridgegen.search.triage.modes import Key, keys_of
 from bridgegen.search.triage.rates import Drawn, how_likely
 from bridgegen.simulation.rollout import FAILURES, STATUS_MESSAGES
@@ -38,12 +39,17 @@ def searcher_of(
     there = screen_of(pipeline, settings.screen)
     there.warm_up()
     assert settings.screen_budget is not None
+    screen = Screen(there, settings.screen.name, settings.screen_budget, settings.budget)
+    if settings.rate:
+        problem = replace(_problem(pipeline, met=_met(pipeline, settings)), screen=screen)
+        name, values = settings.simulator.name, settings.settings
+        return ScreenedRate(problem, settings.seed, name, **values)
     assert settings.screen_batch is not None
     closed_loop = getattr(toolkit.get(settings.algorithm), "is_adversary", False)
     return Screened(
         _algorithm(there, settings),
         None if closed_loop else lambda: _algorithm(pipeline, settings),
-        Screen(there, settings.screen.name, settings.screen_budget),
+        screen,
         _problem(pipeline),
         simulator=settings.simulator.name,
         seed=settings.seed,

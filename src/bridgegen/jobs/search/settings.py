@@ -118,7 +118,8 @@ class Settings(SearchOptions):
                 raise ValueError(f"a text holds NUL, or more than {MAX_TEXT} characters")
             name, settings = given.pop("simulator"), given.pop("simulator_settings")
             screen = given.pop("screen")
-            if screen is not None and None in (given["screen_budget"], given["screen_batch"]):
+            batch = given["screen_batch"] is not None or given["rate"]
+            if screen is not None and not (given["screen_budget"] is not None and batch):
                 raise ValueError("screen: its budget and its batch must be recorded, too")
             found = cls(
                 **given,

@@ -115,38 +115,6 @@ class Road(Protocol):
 
 
 @dataclass(frozen=True)
-class Problem:
-    """A search problem.
-
-    Attributes:
-        parameters: names of the searched parameters, one per column of U.
-        metrics: names of the recorded metrics, one per column of ``Results.metrics``.
-        n_obj: objectives, all minimised.
-        arena: where an adversary drives in closed loop; None without one.
-        levels: per column of U, into how many equal intervals it is divided, each a single value
-            of a category or an integer; 0: it is continuous. Empty: all are.
-        road: how rows are distributed on the road; None: uniformly in the unit cube.
-    """
-
-    parameters: tuple[str, ...]
-    metrics: tuple[str, ...] = ()
-    n_obj: int = 1
-    arena: Arena | None = None
-    levels: tuple[int, ...] = ()
-    road: Road | None = None
-
-    @property
-    def n_var(self) -> int:
-        """Number of searched parameters."""
-        return len(self.parameters)
-
-    @classmethod
-    def unnamed(cls, n_var: int, n_obj: int = 1) -> Self:
-        """Return a problem without a scenario: parameters x0, x1 …, no metrics."""
-        return cls(tuple(f"x{i}" for i in range(n_var)), (), n_obj)
-
-
-@dataclass(frozen=True)
 class Results:
     """Results of n rows.
 
@@ -178,6 +146,69 @@ class Results:
         good = np.ones(n, dtype=bool) if ok is None else ok
         nothing = np.zeros(n, dtype=bool), np.empty((n, 0)), np.full(n, Cause.NONE, np.int8)
         return cls(F, good, *nothing)
+
+
+class Screen(Protocol):
+    """A simulator that is cheap, with a budget of its own.
+
+    Attributes:
+        name: of the simulator.
+        budget: maximum number of evaluations.
+        each: how many they are for each evaluation of the run.
+        evaluations: made so far; a row that is known costs none.
+    """
+
+    name: str
+    budget: int
+    each: float
+
+    @property
+    def evaluations(self) -> int:
+        """See above."""
+
+    def evaluate(self, U: Float) -> tuple[Results, Bool]:
+        """Evaluate rows, up to the budget; rows beyond it are failed ones.
+
+        Args:
+            U: ``(n, n_var)``.
+
+        Returns:
+            Their results, and ``(n,)`` which rows are evaluated for the first time.
+        """
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A search problem.
+
+    Attributes:
+        parameters: names of the searched parameters, one per column of U.
+        metrics: names of the recorded metrics, one per column of ``Results.metrics``.
+        n_obj: objectives, all minimised.
+        arena: where an adversary drives in closed loop; None without one.
+        levels: per column of U, into how many equal intervals it is divided, each a single value
+            of a category or an integer; 0: it is continuous. Empty: all are.
+        road: how rows are distributed on the road; None: uniformly in the unit cube.
+        screen: a cheap simulator beside the run's; None without one.
+    """
+
+    parameters: tuple[str, ...]
+    metrics: tuple[str, ...] = ()
+    n_obj: int = 1
+    arena: Arena | None = None
+    levels: tuple[int, ...] = ()
+    road: Road | None = None
+    screen: Screen | None = None
+
+    @property
+    def n_var(self) -> int:
+        """Number of searched parameters."""
+        return len(self.parameters)
+
+    @classmethod
+    def unnamed(cls, n_var: int, n_obj: int = 1) -> Self:
+        """Return a problem without a scenario: parameters x0, x1 …, no metrics."""
+        return cls(tuple(f"x{i}" for i in range(n_var)), (), n_obj)
 
 
 Arity = Literal["one", "many", "any"]

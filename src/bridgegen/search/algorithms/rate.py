@@ -8,6 +8,9 @@ least. The chance of each row, by all rules together, depends on earlier results
 harm weighted by the road's density over the chance is an unbiased estimate, whatever the models
 are worth (`bridgegen.search.triage.rates`).
 
+A cheap simulator, the screen, evaluates the points of each pool, of which there are as many as its
+budget allows. Models see its result beside the parameters, and learn what it is worth.
+
 Source: importance sampling from a mixture with a defensive part: Owen and Zhou (2000),
 doi:10.1080/01621459.2000.10473909; adaptively: Cornuet et al. (2012), arXiv:0907.1254; rows drawn
 one by one with known chances, by a surrogate: Kossen et al. (2021), arXiv:2103.05331; search and
@@ -32,11 +35,11 @@ from bridgegen.search.algorithms.algorithm import (
     resolve,
 )
 from bridgegen.search.surrogates.gaussian_process import GaussianProcess, Parameters
-from bridgegen.search.surrogates.known import Known, distances
+from bridgegen.search.surrogates.known import Known, compressed, distances
 from bridgegen.search.surrogates.subset import telling
 
-POOL = 2048
-"""Number of points of which a batch is drawn: new ones for each batch."""
+POOL, LEAST_POOL = 2048, 16
+"""Number of points of which a batch is drawn, new ones for each batch; with a screen, at least."""
 
 POOL_ROAD, POOL_EVEN = 0.25, 0.25
 """Shares of a pool that are as on the road, and uniform over the ranges; the others lie near bases.
@@ -148,6 +151,8 @@ class _Pool:
         road: ``(m,)``, how much likelier each one is on the road than in the pool.
         even: ``(m,)``, likewise, among rows that are uniform over the ranges.
         size: number of points, with those that cannot happen.
+        by_screen: ``(m, 2)``, by the screen: objective (inf where it failed, or its budget was
+            spent), and whether critical; ``(m, 0)`` without one.
     """
 
     Z: Float
@@ -156,6 +161,7 @@ class _Pool:
     road: Float
     even: Float
     size: int
+    by_screen: Float
 
 
 @dataclass(frozen=True)
@@ -164,12 +170,14 @@ class _Model:
 
     Attributes:
         objective: a process of the objective.
+        points: ``(m, k)``, what it sees of the pool: points, and what the screen says.
         by_label: ``(m,)``, by how many deviations each point lies on the harmful side, by a process
             of the label; None before both labels are known.
         likely: ``(m,)``, how likely harm is; likewise.
     """
 
     objective: GaussianProcess
+    points: Float
     by_label: Float | None
     likely: Float | None
 
@@ -241,6 +249,8 @@ class Rate:
         self._rng = np.random.Generator(np.random.PCG64(seed))
         self._of_objective: Parameters | None = None
         self._of_label: Parameters | None = None
+        self._problem = problem
+        self._by_screen = np.empty((0, 2 if problem.screen else 0))  # of draws, see `_Pool`
         self.draws = Draws.none(problem.n_var, self.road.dimensions)
 
     @property
@@ -253,13 +263,13 @@ class Rate:
         known, values = self._known, self.values
         many = max(int(known.critical.sum()), len(known) // 10)
         n = max(values["batch"], int(values["growth"] * many)) if len(known) else values["initial"]
-        pool = self._pool()
+        pool = self._pool(n)
         as_road, evenly = values["road"], values["even"]
         if not known.critical.any():  # where harm is rare, rows as on the road do not lead to it
             evenly = as_road
         blind = as_road * _shared(pool.road) + evenly * _shared(pool.even)
         model = self._model(pool) if len(known) else None
-        seek = self._seeker(pool, model, n) if model else None
+        seek = self._seeker(pool, model, n) if model else _as_screened(pool)
         stated, base = as_road + evenly, blind
         if model and model.likely is not None:
             hits = effective(row_weights(self.draws)[known.critical])
@@ -293,6 +303,7 @@ class Rate:
             np.full(n, float(known.critical.sum())),
         )
         self.draws = self.draws.followed_by(drawn)
+        self._by_screen = np.concatenate([self._by_screen, pool.by_screen[taken]])
         known.expect(drawn.U)
         return drawn.U
 
@@ -300,19 +311,25 @@ class Rate:
         """Record the rows; the next batch learns from them."""
         self._known.add(U, results.F[:, 0], results.ok, results.critical)
 
-    def _pool(self) -> _Pool:
-        """Return a new pool."""
+    def _pool(self, n: int) -> _Pool:
+        """Return a new pool for a batch of n rows."""
+        screen, many = self._problem.screen, POOL
+        if screen is not None:
+            # By earlier rows alone. If more points can happen than expected, the last ones are
+            # beyond the screen's budget, and it says nothing of them.
+            due = min(int(screen.each * (self._known.different + n)), screen.budget)
+            many = min(max(due - screen.evaluations, 2 * n, LEAST_POOL), POOL)
         rng, road, known = self._rng, self.road, self._known
         best = np.argsort(known.F, kind="stable")[:BEST]
         bases = self.draws.Z[np.union1d(known.distinct[-FOUND:], best)]
         a, b = (POOL_ROAD, POOL_EVEN) if len(bases) else (0.5, 0.5)
-        n_road, n_even, n_near = int(a * POOL), int(b * POOL), 0
+        n_road, n_even, n_near = int(a * many), int(b * many), 0
         evenly, there = road.even(n_even, rng)
         Z = [road.met(n_road, rng), evenly[there]]
         share = road.share[1]
         if len(bases):
             # Where constraints leave little of the normal space, most points near bases break one.
-            n_near = int((POOL - n_road - n_even) * min(1.0 / share, MORE))
+            n_near = int((many - n_road - n_even) * min(1.0 / share, MORE))
             Z.append(near(bases, road.continuous, n_near, rng))
         points, size = np.concatenate(Z), n_road + n_even + n_near
         U, feasible, log_even = road.rows(points)
@@ -326,36 +343,51 @@ class Rate:
             of_road, of_even = size / pool, size * even / pool
         good = np.isfinite(of_even) & (of_road > 0.0)
         points, U = points[good], U[good]
-        return _Pool(points, U, known.columns.points(U), of_road[good], of_even[good], size)
+        by_screen = np.empty((len(U), 0))
+        if screen is not None:
+            said, _ = screen.evaluate(U)
+            by_screen = np.column_stack([np.where(said.ok, said.F[:, 0], np.inf), said.critical])
+        seen = known.columns.points(U)
+        return _Pool(points, U, seen, of_road[good], of_even[good], size, by_screen)
+
+    def _seen(self, pool: _Pool) -> tuple[Float, Float]:
+        """Return what processes see of the known rows, and of a pool."""
+        points = np.concatenate([self._known.points, pool.points])
+        if self._problem.screen is not None:
+            said = np.concatenate([self._by_screen[: len(self._known)], pool.by_screen])
+            scores = compressed(said[:, 0])
+            scores = (scores - scores.min()) / max(float(np.ptp(scores)), 1e-12)
+            points = np.column_stack([points, scores, said[:, 1]])
+        return points[: len(self._known)], points[len(self._known) :]
 
     def _model(self, pool: _Pool) -> _Model:
         """Return what the rows so far say of the points of a pool."""
         known = self._known
         scores, critical = known.scores(), known.critical
-        rows = telling(scores, MODEL_ROWS)
-        objective = GaussianProcess(known.points[rows], scores[rows], self._of_objective)
+        rows, (points, seen) = telling(scores, MODEL_ROWS), self._seen(pool)
+        objective = GaussianProcess(points[rows], scores[rows], self._of_objective)
         self._of_objective = objective.parameters
         if not critical.any() or critical.all():
-            return _Model(objective, None, None)
+            return _Model(objective, seen, None, None)
         # As in `Surrogate`: harm leaps where a row becomes critical.
         scale = critical.std()
         label = -critical.astype(np.float64) / scale
         rows = telling(label, MODEL_ROWS)
-        process = GaussianProcess(known.points[rows], label[rows], self._of_label)
+        process = GaussianProcess(points[rows], label[rows], self._of_label)
         self._of_label = process.parameters
-        by_label = _deviations(process, pool.points, -0.5 / scale)
+        by_label = _deviations(process, seen, -0.5 / scale)
         least = 0.5 * float(scores[critical].max() + scores[~critical].min())
-        by_objective = _deviations(objective, pool.points, least)
+        by_objective = _deviations(objective, seen, least)
         # Either process misses what the other one knows: of the failures of crossroads-s4, the
         # variance was half of that with the label alone.
         both = ndtr(np.maximum(by_label, by_objective) / DOUBT)
-        return _Model(objective, by_label, np.maximum(both, 1e-12))
+        return _Model(objective, seen, by_label, np.maximum(both, 1e-12))
 
     def _seeker(self, pool: _Pool, model: _Model, n: int) -> Callable[[int, list[int]], Float]:
         """Return the chances of seeking rows: of the k-th row, after others of its batch."""
         known, rng = self._known, self._rng
         some = rng.permutation(len(pool.U))[:PATHS]
-        paths = model.objective.sample(pool.points[some], max(n // 3, 1), rng)
+        paths = model.objective.sample(model.points[some], max(n // 3, 1), rng)
         off = distances(pool.points, known.points[known.distinct])
         apart, joined = self.values["apart"], 0
 
@@ -378,6 +410,18 @@ class Rate:
             return chance
 
         return seek
+
+
+def _as_screened(pool: _Pool) -> Callable[[int, list[int]], Float] | None:
+    """Return the chances of seeking rows before there is a model: as the screen says, if it does.
+
+    Half of them evenly among the points that are critical there, half as on the road.
+    """
+    critical = pool.by_screen[:, 1] if pool.by_screen.size else np.zeros(1)
+    if not critical.any():
+        return None
+    chance = 0.5 * _shared(critical) + 0.5 * _shared(critical * pool.road)
+    return lambda k, taken: chance
 
 
 def _deviations(process: GaussianProcess, points: Float, limit: float) -> Float:

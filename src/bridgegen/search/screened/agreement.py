@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import FiniteFloat, NonNegativeInt, TypeAdapter, ValidationError
 
 from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.search.algorithms.algorithm import Results
+from bridgegen.search.algorithms.algorithm import Results, Screen
 from bridgegen.search.screened.correction import Correction
 
 NOTE = "agreement with the screen"
@@ -223,6 +223,37 @@ class Compared:
     def sums(self) -> tuple[Float, Float]:
         """Return the sum of the objectives, by the screen and by the run's simulator, ``(n,)``."""
         return self.by_screen.sum(axis=1), self.F.sum(axis=1)
+
+
+def agreement(
+    run: Compared, screen: Screen, simulator: str, parameters: Sequence[str]
+) -> Agreement:
+    """Return how far both simulators agree in rows.
+
+    Args:
+        run: the rows, in their order.
+        screen: the screen.
+        simulator: the name of the run's simulator.
+        parameters: names of the columns of U.
+    """
+    found = run.take(run.ok)
+    both, screen_only, simulator_only = counts(found.screened, found.critical)
+    false, half = found.screened & ~found.critical, len(found.U) // 2
+    x, y = found.sums()
+    return Agreement(
+        screen=screen.name,
+        simulator=simulator,
+        screen_evaluations=screen.evaluations,
+        screen_budget=screen.budget,
+        compared=len(found.U),
+        both=both,
+        screen_only=screen_only,
+        simulator_only=simulator_only,
+        rank_correlation=rank_correlation(x, y),
+        false_early=int(false[:half].sum()),
+        false_late=int(false[half:].sum()),
+        place=place_of(parameters, found.U, np.abs(y - x)),
+    )
 
 
 # --- What the screen has found, and the choice of what the run's simulator evaluates ---

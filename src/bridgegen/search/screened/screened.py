@@ -1,7 +1,8 @@
 """An algorithm that searches in one simulator for the rows that another one evaluates."""
 
 from collections.abc import Callable, Mapping
-from typing import ClassVar, Protocol
+from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,16 +13,18 @@ from bridgegen.search.algorithms.algorithm import (
     Arity,
     Problem,
     Results,
+    Screen,
     Setting,
     TakesNotes,
+    Value,
 )
+from bridgegen.search.algorithms.rate import Rate
 from bridgegen.search.screened.agreement import (
     NOTE,
     Agreement,
     Compared,
     Pool,
-    counts,
-    place_of,
+    agreement,
     rank_correlation,
 )
 from bridgegen.search.screened.correction import Correction
@@ -55,33 +58,6 @@ converged."""
 
 TRIES = 8
 """Number of random rows that are drawn for one that is new to the screen."""
-
-
-class Screen(Protocol):
-    """A simulator that is cheap, with a budget of its own.
-
-    Attributes:
-        name: of the simulator.
-        budget: maximum number of evaluations.
-        evaluations: made so far; a row that is known costs none.
-    """
-
-    name: str
-    budget: int
-
-    @property
-    def evaluations(self) -> int:
-        """See above."""
-
-    def evaluate(self, U: Float) -> tuple[Results, Bool]:
-        """Evaluate rows; the caller keeps to the budget.
-
-        Args:
-            U: ``(n, n_var)``.
-
-        Returns:
-            Their results, and ``(n,)`` which rows are evaluated for the first time.
-        """
 
 
 class Screened:
@@ -182,27 +158,9 @@ class Screened:
 
     def agreement(self) -> Agreement:
         """Return how far both simulators agree so far."""
-        run = self._run
-        found = run.take(run.ok)
-        both, screen_only, simulator_only = counts(found.screened, found.critical)
-        false, half = found.screened & ~found.critical, len(found.U) // 2
-        x, y = found.sums()
-        return Agreement(
-            screen=self._screen.name,
-            simulator=self._simulator,
-            screen_evaluations=self._screen.evaluations,
-            screen_budget=self._screen.budget,
-            compared=len(found.U),
-            both=both,
-            screen_only=screen_only,
-            simulator_only=simulator_only,
-            rank_correlation=rank_correlation(x, y),
-            false_early=int(false[:half].sum()),
-            false_late=int(false[half:].sum()),
-            place=place_of(self._problem.parameters, found.U, np.abs(y - x)),
-            ended_after=self._ended if self._alone is not None else None,
-            ended_because=self._because,
-        )
+        found = agreement(self._run, self._screen, self._simulator, self._problem.parameters)
+        ended = self._ended if self._alone is not None else None
+        return replace(found, ended_after=ended, ended_because=self._because)
 
     def _propose(self, n: int) -> None:
         """Let the algorithm search in the screen, up to the share of its budget that is due.
@@ -285,3 +243,34 @@ class Screened:
             f"the screen {self._screen.name} is given up after {self._ended} evaluations: "
             f"{because}; the search continues without it"
         )
+
+
+class ScreenedRate(Rate):
+    """`Rate` beside a screen, with what both simulators agree in among its notes.
+
+    Args:
+        problem: of the run, with its screen.
+        seed: of the run.
+        simulator: the name of the run's simulator.
+        **settings: of `Rate`.
+    """
+
+    def __init__(self, problem: Problem, seed: int, simulator: str, **settings: Value) -> None:
+        super().__init__(problem, seed, **settings)
+        self._simulator = simulator
+
+    def notes(self) -> Mapping[str, JSON]:
+        """Return what both simulators agree in."""
+        known = self._known
+        _, first = np.unique(known.columns.snapped(known.U), axis=0, return_index=True)
+        by_screen, F = self._by_screen[: len(known)], known.F[:, np.newaxis]
+        ok = np.isfinite(by_screen[:, 0]) & np.isfinite(known.F)
+        rows = Compared(known.U, by_screen[:, :1], by_screen[:, 1] > 0.0, F, known.critical, ok)
+        assert self._problem.screen is not None
+        found = agreement(
+            rows.take(np.sort(first)),
+            self._problem.screen,
+            self._simulator,
+            self._problem.parameters,
+        )
+        return {NOTE: found.to_dict()}

@@ -126,6 +126,11 @@ class Known:
         return len(self.F)
 
     @property
+    def different(self) -> int:
+        """Number of different rows that have been asked for."""
+        return len(self._rows)
+
+    @property
     def exhausted(self) -> bool:
         """Whether all rows there are have been told, or asked for."""
         return 0 < self.columns.count <= len(self._rows)
