@@ -22,10 +22,13 @@ from bridgegen.base.processes.child import ONE_THREAD, collect_rarely
 CHECKERS = "BRIDGEGEN_CHECKERS"
 
 LONGEST = (
-    "test_snippets.py", "test_fuzzing.py", "benchmark/test_benchmark.py", "suite/test_page.py",
+    "test_snippets.py", "sensitivity/test_sensitivity.py", "campaign/test_catalogue.py",
+    "campaign/test_campaign.py", "search/test_contract.py", "test_fuzzing.py",
+    "campaign/test_export.py", "triage/test_run.py", "benchmark/test_benchmark.py",
+    "risk/test_risk.py", "risk/estimators/test_contract.py", "reproduction/test_reproduction.py",
+    "campaign/test_ahead.py", "simulation/test_contract.py", "suite/test_page.py",
     "mining/events/test_round_trip.py", "mining/events/test_merging_round_trip.py",
-    "campaign/test_file_scenario.py", "reproduction/test_reproduction.py",
-    "risk/estimators/test_contract.py", "search/test_contract.py", "compilation/test_library.py",
+    "campaign/test_file_scenario.py", "compilation/test_library.py",
 )  # fmt: skip
 """Files that take some ten seconds of processor time or more: processes take them first."""
 

@@ -20,6 +20,8 @@ from bridgegen.jobs.search.regions import regions_of
 from bridgegen.pages.playbacks import beside_others, measured_playbacks, others_of
 from bridgegen.scenario.language.reader import load
 
+pytestmark = pytest.mark.thorough
+
 DRIVERS = Path(__file__).parent / "ego" / "drivers.py"
 NAME = "crossroads-s3"
 

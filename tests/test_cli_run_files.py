@@ -19,6 +19,8 @@ from bridgegen.cli import main
 from bridgegen.engine.options import SearchOptions, options_of
 from bridgegen.simulation.choice import SimulatorChoice
 
+pytestmark = pytest.mark.thorough
+
 NAMES = st.text("abcdefgh_", min_size=1, max_size=8)
 NUMBERS = st.floats(-1e9, 1e9, allow_nan=False, width=32).map(float)
 TEXTS = st.text("abc: #'-{}[]%0123", min_size=1, max_size=12).filter(lambda t: not t.isspace())

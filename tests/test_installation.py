@@ -19,6 +19,8 @@ from bridgegen.cli import installation
 from bridgegen.cli.installation import Finding, examine
 from bridgegen.engine import conformance
 
+pytestmark = pytest.mark.thorough
+
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 
 

@@ -18,6 +18,8 @@ from bridgegen.results.store import Store
 from bridgegen.simulation import choice
 from bridgegen.simulation.choice import SimulatorChoice
 
+pytestmark = pytest.mark.thorough
+
 
 class Double:
     """The embedded simulator, whose rollouts are given to somebody first."""

@@ -11,6 +11,8 @@ from bridgegen.jobs.search import driver_contract
 from bridgegen.jobs.search.driver_contract import check_driver
 from bridgegen.testing import DriverContract
 
+pytestmark = pytest.mark.thorough
+
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
@@ -172,7 +174,6 @@ def test_a_driver_that_drives_nothing_is_not_tried_further():
     assert len(checks) == 5
 
 
-@pytest.mark.thorough
 def test_the_command_says_it_and_ends_with_a_status():
     run = CliRunner().invoke
     good = run(app, ["validate", f"{DRIVERS}:Cruises", "--scenario", CROSSROADS])

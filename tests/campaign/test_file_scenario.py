@@ -26,6 +26,8 @@ from .braking import (
     write_pair,
 )
 
+pytestmark = pytest.mark.thorough
+
 
 def columns(folder: Path) -> dict[str, np.ndarray]:
     with Store.open(folder) as store:

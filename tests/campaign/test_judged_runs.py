@@ -18,6 +18,8 @@ from bridgegen.engine.workers.processes import Processes
 from bridgegen.jobs.search import SearchCallbacks
 from bridgegen.scenario.language.criteria import read_criteria
 
+pytestmark = pytest.mark.thorough
+
 GAP, TTC, CRASH = "R-12: always(gap to bv > 2 m)", "R-13: ttc >= 1.5 s", "R-14: n_collision == 0"
 BUDGET = 240
 MARGIN = "criterion:R-12"

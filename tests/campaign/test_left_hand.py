@@ -34,6 +34,8 @@ from bridgegen.scenario.countries import COUNTRIES, in_the_mirror
 from bridgegen.scenario.language.reader import load, shipped_text
 from bridgegen.simulation.trace import write_trace
 
+pytestmark = pytest.mark.thorough
+
 MOTION = ("x", "y", "h", "v", "a", "offset", "began", "n_steps", "detections", "lights", "friction")
 
 

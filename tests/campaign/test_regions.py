@@ -16,6 +16,8 @@ from bridgegen.scenario.ontology.vocabulary import LABEL
 
 from .braking import limits, stochastic, write_pair
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

@@ -20,6 +20,8 @@ from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from .biased import biased_kind, not_finite, slower
 from .braking import write_pair
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(autouse=True)
 def simulators(monkeypatch):

@@ -4,6 +4,8 @@ import shutil
 
 import pytest
 
+pytestmark = pytest.mark.thorough
+
 HIGH = "from bridgegen._high_kernels import high\n    "
 LOW = "from bridgegen._low_kernels import low\n    "
 CHECK = "import math; assert high(0.5) == 2.0 * math.sin(0.5) + 2.0 * math.sin(1.5)"

@@ -18,6 +18,8 @@ from bridgegen.jobs.safety_case.numbers import Numbers
 from bridgegen.jobs.search.exported import exported_scenarios
 from bridgegen.results.store import Recorded, Store
 
+pytestmark = pytest.mark.thorough
+
 NUMBERS = st.floats(-1e6, 1e6)
 
 

@@ -16,6 +16,8 @@ from bridgegen.jobs.suite.known_failures import words
 from bridgegen.results.failures import read_failures
 from bridgegen.results.validated import Region, Validated, extrapolated
 
+pytestmark = pytest.mark.thorough
+
 REGION = Region(
     scenario="s", fingerprint="f", vehicle="kinematic", evidence="3 rows confirmed in double",
     ranges={"speed": (5.0, 20.0, "m/s"), "gap": (1.0, 2.0, "1")},

@@ -20,6 +20,8 @@ from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.search import Run, resume, run_search
 from bridgegen.scenario.language.reader import load
 
+pytestmark = pytest.mark.thorough
+
 ROOT = Path(__file__).parents[2]
 
 

@@ -19,6 +19,8 @@ from bridgegen.scenario.exposure.exposure import poisson_interval
 from bridgegen.scenario.language.json_schema import schema
 from bridgegen.scenario.language.reader import load
 
+pytestmark = pytest.mark.thorough
+
 # Two parameters of a triangle: the constraint keeps half of a square.
 SCENARIO = """\
 scenario: triangle

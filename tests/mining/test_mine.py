@@ -20,6 +20,8 @@ from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.recordings.readers.formats import read
 from bridgegen.recordings.readers.quality import Rule
 
+pytestmark = pytest.mark.thorough
+
 
 def rows(path):
     with path.open(newline="", encoding="utf-8") as file:

@@ -24,6 +24,8 @@ from bridgegen.scenario.exposure import read_exposure
 from bridgegen.scenario.language.parameterisation import ELEMENTS, NOT_KNOWN, Parameterisation
 from bridgegen.scenario.language.reader import load
 
+pytestmark = pytest.mark.thorough
+
 ROWS, DRIVER = 60, "un-r157"
 
 

@@ -21,6 +21,8 @@ from bridgegen.jobs.suite.suite import run_suite
 from bridgegen.results.store import Store
 from bridgegen.scenario.odd.states import states_of
 
+pytestmark = pytest.mark.thorough
+
 HERE = Path(__file__).parent
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/motorway-odd.yaml"
 

@@ -27,6 +27,8 @@ from bridgegen.jobs.search import Run
 from bridgegen.jobs.search.scenarios import load
 from bridgegen.jobs.suite.difference import Difference, RowChange
 
+pytestmark = pytest.mark.thorough
+
 DRIVERS = Path(__file__).with_name("drivers.py")
 OWN = f"{DRIVERS}:BrakesTooLittle"
 NUMBERS = (Tunable("headway", 0.5, 0.0, 2.0, "s"), Tunable("gain", 1.0, 0.0, 2.0))

@@ -24,6 +24,8 @@ from bridgegen.pages.simulation_payload import simulation_payload
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded import portable
 
+pytestmark = pytest.mark.thorough
+
 STATES = ("x", "y", "h", "v", "a")
 
 HOST = """

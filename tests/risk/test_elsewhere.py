@@ -22,6 +22,8 @@ from bridgegen.jobs.risk.outcomes import Column
 from bridgegen.jobs.risk.risk import estimate_risk
 from bridgegen.simulation import choice
 
+pytestmark = pytest.mark.thorough
+
 SCENARIO, DRIVER = "paper/crossroads-s1", "route-follower"
 GIVEN = {
     "ego": DRIVER, "exposure": "uniform", "method": "mc", "event": "conflict", "precision": 0.0,

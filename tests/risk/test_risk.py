@@ -24,6 +24,8 @@ from bridgegen.jobs.risk.risk import estimate_risk
 from bridgegen.pages.birdseye import ASPHALT
 from bridgegen.pages.templates import number, odds
 
+pytestmark = pytest.mark.thorough
+
 SCENARIO, DRIVER = "crossroads-s1", "route-follower"
 GIVEN = {"ego": DRIVER, "exposure": "uniform", "method": "mc", "precision": 0.0, "budget": 1200}
 

@@ -17,6 +17,8 @@ from bridgegen.jobs.risk.estimators.weighted import Weighted
 from bridgegen.jobs.risk.extremes import of_near_misses
 from bridgegen.jobs.risk.total import estimate_total_risk
 
+pytestmark = pytest.mark.thorough
+
 NAMES = ("crossroads-s1", "lead-brakes", "cut-in")
 MET = """\
 exposure_of: {name}

@@ -13,6 +13,8 @@ from scipy.stats import binom, binomtest
 
 from bridgegen.jobs.safety_case import recompute
 
+pytestmark = pytest.mark.thorough
+
 
 @st.composite
 def counts(draw):

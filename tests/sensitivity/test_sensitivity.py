@@ -21,6 +21,8 @@ from bridgegen.jobs.search.sensitivity import _write_page, sensitivity_of, share
 from bridgegen.scenario.language.reader import load
 from bridgegen.search.sensitivity import JSON_FILE, read_record
 
+pytestmark = pytest.mark.thorough
+
 FEW = {"findings": 3, "trajectories": 2}
 
 

@@ -30,6 +30,8 @@ from bridgegen.scenario.language.kinds import FLOAT
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.choice import EMBEDDED
 
+pytestmark = pytest.mark.thorough
+
 PLANTED = Path(__file__).with_name("planted.py")
 SEEDS, NUMBER = 20, 100
 """Of a key that draws 100, 80 lie in the ranges: a fifth of the 500 that are allowed."""

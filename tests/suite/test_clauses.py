@@ -19,6 +19,8 @@ from bridgegen.jobs.suite.suite import evaluate_suite
 from bridgegen.scenario import packs
 from bridgegen.scenario.typology import typologies
 
+pytestmark = pytest.mark.thorough
+
 PACK = Path(packs.__path__[0]) / "r157"
 
 

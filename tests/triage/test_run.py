@@ -21,6 +21,8 @@ from bridgegen.search.triage.minimal import Ladder
 from bridgegen.search.triage.modes import keys_of
 from bridgegen.search.triage.moves import nearest
 
+pytestmark = pytest.mark.thorough
+
 GIVEN = {
     "algorithm": "random", "budget": 150, "seed": 0, "ego": "route-follower", "keep": 4,
     "objective": {"harm": None},

@@ -23,6 +23,8 @@ from bridgegen.simulation.choice import SimulatorChoice
 from ..embedded.storyboards import crossroads, lane, scenario, start
 from .stand_in import DEFAULT_MAP
 
+pytestmark = pytest.mark.thorough
+
 FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections")
 
 
