@@ -77,9 +77,9 @@ def test_validate_and_simulate_agree(folder, place):
         assert bool(refused) == bool(wrong), number
 
 
-@pytest.mark.parametrize("number", ["0", "-1", "INF", "${1/0}", "1e999"])
+@pytest.mark.parametrize("number", ["-1", "INF", "${1/0}", "1e999"])
 @pytest.mark.parametrize("place", ['width="2.0"', 'length="4.0"'])
-def test_a_box_has_an_area(folder, place, number):
+def test_a_box_has_a_size(folder, place, number):
     path = folder / "flat.xosc"
     path.write_text(text().replace(place, f'{place[:-5]}"{number}"', 1), "utf-8")
     said = validate_file(path)

@@ -266,9 +266,9 @@ def test_what_cannot_be_run_is_refused_by_name_and_line_all_at_once():
     approve(error.value.problems[0], "LaneChangeAction")
 
 
-def test_an_entity_needs_a_start():
-    with refuses(InputError, "bv", "TeleportAction"):
-        simulator(scenario(("ego", "bv"), SOUTHBOUND))
+def test_the_ego_needs_a_start():
+    with refuses(InputError, "'ego'", "TeleportAction"):
+        simulator(scenario(("ego", "bv"), SOUTHBOUND.replace('"ego"', '"bv"')))
 
 
 def test_a_route_that_no_lane_leads_along_is_named():
