@@ -78,7 +78,7 @@ def run(tmp_path_factory) -> bg.Run:
     )
 
 
-EVERY = [f"{one}{more}" for one in covering() for more in ("", "-random")]
+EVERY = [f"{one}-random" for one in covering()]
 every = pytest.mark.parametrize("name", EVERY)
 
 
