@@ -43,7 +43,7 @@ class Modes {
     const notes = found.rate ? [`${found.rate}.`] : [], nearest = nearestToHarm();
     if (nearest !== null && !anyViolated()) notes.push(`Evaluation ${number(nearest + 1)}, which came nearest to harm, is shown below.`);
     if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
-    if (found.covered) notes.push(`Found of what fails: of fresh random scenarios, ${found.covered}.`);
+    if (found.covered) notes.push(`Share found: of fresh random scenarios, ${found.covered}.`);
     if (found.influences.length) notes.push(`What matters most: ${found.influences.slice(0, 3).map(({ name }) => name).join(", ")}.`);
     if (found.steps) notes.push(`${capital(found.steps)}.`);
     if (found.extrapolated) notes.push(`Extrapolated: ${found.extrapolated}.`);
