@@ -1,21 +1,12 @@
-"""The messages of ASAM OSI that are written: their declaration, their bytes, their schema.
+"""The messages of ASAM OSI that are written.
 
-A message is a list of parts. Bytes are the same at all instants; an array ``(T, …)`` has a value
-for each. All instants of a message have the same length, so that `rows` writes them at once.
-
-Source: ASAM OSI 3.7.0; Protocol Buffers, "Encoding" and descriptor.proto.
+Source: ASAM OSI 3.7.0.
 """
 
-import struct
-from typing import Any, NamedTuple
-
-import numpy as np
-import numpy.typing as npt
+from bridgegen.base.protobuf import Schema
 
 VERSION = (3, 7, 0)
 """The version of OSI."""
-
-Parts = list[bytes | npt.NDArray[Any]]
 
 _MESSAGES = """
 GroundTruth: version InterfaceVersion 1, timestamp Timestamp 2, host_vehicle_id Identifier 3,
@@ -64,9 +55,7 @@ Lane.Classification.LanePairing: antecessor_lane_id Identifier 1, successor_lane
 EnvironmentalConditions: ambient_illumination .AmbientIllumination 1,
     precipitation .Precipitation 6, fog .Fog 7
 """
-"""Each message's fields: name, type and number. A type has ``*`` where the field may come several
-times; one that begins with a dot is the message's own. Lists of what is never written are declared,
-for viewers ask for them."""
+"""Lists of what is never written are declared, for viewers ask for them."""
 
 _ENUMS = """
 MovingObject.Type TYPE: UNKNOWN OTHER VEHICLE PEDESTRIAN ANIMAL
@@ -96,147 +85,5 @@ EnvironmentalConditions.Precipitation PRECIPITATION: UNKNOWN OTHER NONE VERY_LIG
 EnvironmentalConditions.Fog FOG: UNKNOWN OTHER EXCELLENT_VISIBILITY GOOD_VISIBILITY
     MODERATE_VISIBILITY POOR_VISIBILITY MIST LIGHT THICK DENSE
 """
-"""Each enumeration with its prefix, and its values, which count from 0."""
-
-
-class _Field(NamedTuple):
-    type: str
-    number: int
-    repeated: bool
-
-
-def _entries(text: str) -> list[tuple[str, str]]:
-    """Return the head and the rest of each entry, which goes on where lines are indented."""
-    lines = text.strip().replace("\n    ", " ").splitlines()
-    return [(head, rest.strip()) for head, _, rest in (line.partition(":") for line in lines)]
-
-
-def _fields(name: str, text: str) -> dict[str, _Field]:
-    each = [field.split() for field in text.split(",")]
-    return {
-        field: _Field((name if kind[0] == "." else "") + kind.strip("*"), int(number), "*" in kind)
-        for field, kind, number in each
-    }
-
-
-_FIELDS = {name: _fields(name, rest) for name, rest in _entries(_MESSAGES)}
-VALUES = {head.split()[0]: rest.split() for head, rest in _entries(_ENUMS)}
-"""The values of each enumeration, in order."""
-_PREFIXES = dict(head.split() for head, _ in _entries(_ENUMS))
-_SCALARS = {"double": 1, "int64": 3, "uint64": 4, "bool": 8, "string": 9, "uint32": 13}
-"""Codes of types in descriptor.proto."""
-_MESSAGE, _ENUM, _OPTIONAL, _REPEATED = 11, 14, 1, 3
-_VARINT, _DOUBLE, _LENGTH = 0, 1, 2
-"""Types on the wire."""
-
-
-def message(kind: str, **values: Any) -> Parts:
-    """Return a message.
-
-    Args:
-        kind: its name.
-        values: by the names of its fields: a number, a text, a name of an enumeration, a message;
-            a sequence of these where the field may come several times. ``(T,)`` float64 for a
-            double, ``(T,)`` uint8 below 128 for an enumeration. None is left out.
-    """
-    found: Parts = []
-    for name, value in values.items():
-        field = _FIELDS[kind][name]
-        if value is not None:
-            for one in value if field.repeated else (value,):
-                found += _of_field(field, one)
-    return found
-
-
-def _of_field(field: _Field, value: Any) -> Parts:
-    number, kind = field.number, field.type
-    if kind in _FIELDS:
-        return nested(number, value)
-    if kind == "double":
-        data = value if isinstance(value, np.ndarray) else struct.pack("<d", value)
-        return [_key(number, _DOUBLE), data]
-    if kind == "string":
-        return nested(number, [value.encode()])
-    if kind in VALUES and isinstance(value, str):
-        value = VALUES[kind].index(value)
-    return [_key(number, _VARINT), value if isinstance(value, np.ndarray) else varint(value)]
-
-
-def nested(number: int, parts: Parts) -> Parts:
-    """Return a message, or a text, as a field of another message."""
-    size = sum(part.itemsize if isinstance(part, np.ndarray) else len(part) for part in parts)
-    return [_key(number, _LENGTH) + varint(size), *parts]
-
-
-def _key(number: int, wire_type: int) -> bytes:
-    return varint(number << 3 | wire_type)
-
-
-def varint(value: int) -> bytes:
-    """Return a whole number ≥ 0 as Protocol Buffers write it."""
-    found = bytearray()
-    while value > 127:
-        found.append(value & 127 | 128)
-        value >>= 7
-    return bytes((*found, value))
-
-
-def flat(parts: Parts) -> bytes:
-    """Return a message that is the same at all instants."""
-    return b"".join(part if isinstance(part, bytes) else part.tobytes() for part in parts)
-
-
-def rows(parts: Parts, n: int) -> list[bytes]:
-    """Return a message at each of n instants."""
-    columns = [
-        part.astype(part.dtype.newbyteorder("<")).view(np.uint8).reshape(n, -1)
-        if isinstance(part, np.ndarray)
-        else np.broadcast_to(np.frombuffer(part, np.uint8), (n, len(part)))
-        for part in parts
-    ]
-    whole = np.concatenate(columns, axis=1)
-    data, size = whole.tobytes(), whole.shape[1]
-    return [data[k : k + size] for k in range(0, n * size, size)]
-
-
-# --- The schema, as MCAP files carry it: a FileDescriptorSet ---
-
-
-def schema() -> bytes:
-    """Return the part of OSI's schema that is declared here, as a FileDescriptorSet."""
-    parts = [*nested(1, [b"osi3.proto"]), *nested(2, [b"osi3"])]
-    for name in _FIELDS:
-        if "." not in name:
-            parts += nested(4, _descriptor(name))
-    return flat(nested(1, parts))
-
-
-def _descriptor(name: str) -> Parts:
-    """Return the DescriptorProto of a message."""
-    found = nested(1, [_last(name)])
-    for field, (kind, number, repeated) in _FIELDS[name].items():
-        of = _SCALARS.get(kind) or (_MESSAGE if kind in _FIELDS else _ENUM)
-        about = nested(1, [field.encode()])
-        about.append(_numbers((3, number), (4, _REPEATED if repeated else _OPTIONAL), (5, of)))
-        if kind not in _SCALARS:
-            about += nested(6, [f".osi3.{kind}".encode()])
-        found += nested(2, about)
-    for inner in _FIELDS:
-        if inner.rpartition(".")[0] == name:
-            found += nested(3, _descriptor(inner))
-    for inner, words in VALUES.items():
-        if inner.rpartition(".")[0] == name:
-            values = nested(1, [_last(inner)])
-            for number, word in enumerate(words):
-                label = nested(1, [f"{_PREFIXES[inner]}_{word}".encode()])
-                values += nested(2, [*label, _numbers((2, number))])
-            found += nested(4, values)
-    return found
-
-
-def _last(name: str) -> bytes:
-    return name.rpartition(".")[2].encode()
-
-
-def _numbers(*fields: tuple[int, int]) -> bytes:
-    return b"".join(_key(number, _VARINT) + varint(value) for number, value in fields)
+OSI = Schema("osi3", _MESSAGES, _ENUMS)
+message, VALUES = OSI.message, OSI.values

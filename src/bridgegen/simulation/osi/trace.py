@@ -19,23 +19,14 @@ import numpy as np
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
+from bridgegen.base.protobuf import Parts, flat, nested, rows
 from bridgegen.drivers import kinds
 from bridgegen.drivers._weather_columns import BACKGROUND, RAIN, SNOW, VISUAL_RANGE
 from bridgegen.openx.opendrive.mirror import as_written
 from bridgegen.openx.opendrive.model import DRIVABLE, OpenDrive
 from bridgegen.openx.opendrive.outline import lights
-from bridgegen.scenario.participants import PARTICIPANTS
 from bridgegen.simulation.osi.mcap import mcap
-from bridgegen.simulation.osi.messages import (
-    VALUES,
-    VERSION,
-    Parts,
-    flat,
-    message,
-    nested,
-    rows,
-    schema,
-)
+from bridgegen.simulation.osi.messages import OSI, VALUES, VERSION, message
 from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
@@ -54,7 +45,6 @@ _VEHICLES = {
     "car": "MEDIUM_CAR", "truck": "HEAVY_TRUCK", "bus": "BUS", "motorcycle": "MOTORBIKE",
     "bicycle": "BICYCLE", "tram": "TRAM", "e-scooter": "STANDUP_SCOOTER", "": "OTHER",
 }  # fmt: skip
-_HEIGHTS = {kind.seen_as.name: kind.body.height for kind in reversed([*PARTICIPANTS.values()])}
 _HEIGHT = 1.5  # m, where the kind is unknown
 _SUBTYPES = {"driving": "NORMAL", "walking": "SIDEWALK"}
 """Subtypes of lanes that have other words than OpenDRIVE's types."""
@@ -114,7 +104,9 @@ def write_osi(paths: Sequence[Path], rollout: Rollout, around: Surroundings, row
         kind = SENSOR_VIEW if is_view else GROUND_TRUTH
         messages = map(_sensor_view, truths) if is_view else truths
         metadata = ("net.asam.osi.trace", about)
-        write_whole(path, mcap(kind, f"osi3.{kind}", schema(), messages, metadata, channel))
+        write_whole(
+            path, mcap(kind, f"osi3.{kind}", OSI.descriptors(), messages, metadata, channel)
+        )
 
 
 def _sensor_view(truth: tuple[int, bytes]) -> tuple[int, bytes]:
@@ -181,7 +173,7 @@ def _object(rollout: Rollout, row: int, e: int, n: int) -> Parts:
     known = len(rollout.kinds) and rollout.kinds[e] >= 0
     kind = kinds.NAMES[rollout.kinds[e]] if known else ""
     length, width, ahead = rollout.box[e].tolist()
-    height = _HEIGHTS.get(kind, _HEIGHT)
+    height = kinds.HEIGHTS[rollout.kinds[e]] if known else _HEIGHT
     x, y, h, v, a = (getattr(rollout, name)[row, e, :n] for name in ("x", "y", "h", "v", "a"))
     cos, sin = elementary.cos(h), elementary.sin(h)
     rate = np.gradient(h, rollout.time_step) if n > 1 else np.zeros(n)
