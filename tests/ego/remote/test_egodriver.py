@@ -173,7 +173,7 @@ def ends(request, context):
     [
         (aborts("INTERNAL", "out of \x1b[31m\nmemory"), "raised", "INTERNAL: out of"),
         (ends, "raised", "ended the session"),
-        (lambda request, context: time.sleep(1.0), "timed out", "drive"),
+        (lambda request, context: time.sleep(1.0), "timed out", "0.4 s"),
         (b"\xff\xff", "answered nonsense", "byte 0"),
         (b"\x12\x05\x0a", "answered nonsense", "cut off"),
         (b"\x10\x01", "answered nonsense", "trajectory"),

@@ -125,7 +125,11 @@ class Calls:
         """Close the session and the channel, as does this object's deletion."""
         self._end()
 
-    def begin(self, seed: int, until: float) -> str:
+    def allow(self, seconds: float) -> None:
+        """Set the time limit of all calls from now on [s]."""
+        self._seconds, self._until = seconds, time.monotonic() + seconds
+
+    def begin(self, seed: int) -> str:
         """Start a session; return its id. One that is open is closed.
 
         Raises:
@@ -133,25 +137,22 @@ class Calls:
         """
         for session in self._open[:]:
             self._open.remove(session)
-            self.ask(
-                "close_session", _message("DriveSessionCloseRequest", session_uuid=session), until
-            )
+            self.ask("close_session", _message("DriveSessionCloseRequest", session_uuid=session))
         session = str(uuid.uuid4())  # several workers may ask one server
         vehicle = _message("RolloutSpec", vehicle=[])
         request = _message(
             "DriveSessionRequest", session_uuid=session, random_seed=seed, rollout_spec=vehicle
         )
-        self.ask("start_session", request, until)
+        self.ask("start_session", request)
         self._open.append(session)
         return session
 
-    def ask(self, method: str, message: Parts, until: float) -> bytes:
+    def ask(self, method: str, message: Parts) -> bytes:
         """Return what a call answers.
 
         Args:
             method: its name.
             message: what is sent.
-            until: time limit, by the monotonic clock [s].
 
         Raises:
             CallError: it was not answered. The channel is closed, unless the driver reports an
@@ -159,7 +160,7 @@ class Calls:
         """
         import grpc
 
-        seconds = max(until - time.monotonic(), 0.0)
+        seconds = max(self._until - time.monotonic(), 0.0)
         try:
             answer: bytes = self._of(method)(
                 flat(message), timeout=seconds, metadata=self._metadata
@@ -176,7 +177,8 @@ class Calls:
             self._open.clear()  # who does not answer is not asked to close
             self._end()
             if code is grpc.StatusCode.DEADLINE_EXCEEDED:
-                raise self.error("timed out", f"no answer to {method} in time") from None
+                text = f"no answer to {method} within {self._seconds:g} s"
+                raise self.error("timed out", text) from None
             raise self.error("died", f"{method}: {_told(problem)}") from None
         except ValueError as problem:  # closed from another thread before the call
             raise self.error("died", f"{method}: {problem}") from None
@@ -225,8 +227,9 @@ class Egodriver:
 
     def __init__(self, calls: Calls, seconds: float) -> None:
         self.seconds, self._calls = seconds, calls
+        calls.allow(seconds)
         try:
-            calls.begin(0, time.monotonic() + seconds)
+            calls.begin(0)
         except CallError as error:
             raise type(error)(
                 error.kind, f"a session without cameras (none are rendered) must start: {error}"
@@ -238,7 +241,8 @@ class Egodriver:
         Raises:
             CallError: it was not answered.
         """
-        self._session = self._calls.begin(int(scene.seed[0]), time.monotonic() + self.seconds)
+        self._calls.allow(self.seconds)
+        self._session = self._calls.begin(int(scene.seed[0]))
         self._scene, self._before = scene, (0.0, math.nan)
 
     def act(self, observation: Observation) -> Trajectory:
@@ -247,7 +251,8 @@ class Egodriver:
         Raises:
             CallError: it was not answered, or not with a plan.
         """
-        until, calls, session = time.monotonic() + self.seconds, self._calls, self._session
+        calls, session = self._calls, self._session
+        calls.allow(self.seconds)
         now = _microseconds(observation.time)
         egomotion = _message(
             "RolloutEgoTrajectory",
@@ -263,11 +268,9 @@ class Egodriver:
             time_query_us=now + _microseconds(self.period),
             renderer_data=self._around(observation, now) if calls.extends else None,
         )
-        calls.ask("submit_egomotion_observation", egomotion, until)
-        calls.ask(
-            "submit_route", _message("RouteRequest", session_uuid=session, route=route), until
-        )
-        answer = calls.ask("drive", request, until)
+        calls.ask("submit_egomotion_observation", egomotion)
+        calls.ask("submit_route", _message("RouteRequest", session_uuid=session, route=route))
+        answer = calls.ask("drive", request)
         try:
             response = _CONTRACT.read("DriveResponse", answer)
             if response["terminate_session"]:
