@@ -14,6 +14,7 @@ from bridgegen.base.errors import InputError
 from bridgegen.base.protobuf import flat, rows
 from bridgegen.cli import main
 from bridgegen.drivers import kinds
+from bridgegen.drivers.osi import OSI, message
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.search.export import export_traces
@@ -21,7 +22,6 @@ from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.recordings.readers.formats import read
 from bridgegen.recordings.readers.mcap import read_messages
 from bridgegen.scenario.language.reader import load
-from bridgegen.simulation.osi.messages import OSI, message
 from bridgegen.simulation.osi.trace import Surroundings, ground_truths
 from bridgegen.simulation.rollout import Rollout
 from bridgegen.simulation.trace import write_trace

@@ -198,9 +198,9 @@ def make(spec: str) -> BatchDriver | CompiledDriver:
             function that is not a compiled driver, or that cannot be compiled.
     """
     if spec.endswith(".fmu"):
-        from bridgegen.drivers.fmu import FmuDriver
+        from bridgegen.drivers.fmu import fmu_driver
 
-        return FmuDriver(spec)
+        return fmu_driver(spec)
     where, _, name = spec.rpartition(":")
     try:
         # In the driver's own process. Only what a person has typed comes here: a name in a file or

@@ -3,7 +3,7 @@
 from concurrent import futures
 
 import grpc
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from tests.google_messages import classes
 
 # NVlabs/alpasim, src/grpc/alpasim_grpc/v0/common.proto and egodriver.proto; carla_driver.proto of
 # carla-driver-interface: name, type (of a message: its name) and number of each field.
@@ -47,31 +47,7 @@ REQUESTS = {
 }
 
 
-def classes():
-    """Google's classes of the messages, by name."""
-    file = descriptor_pb2.FileDescriptorProto(name="contract.proto", syntax="proto3", package="c")
-    codes = descriptor_pb2.FieldDescriptorProto
-    for name, fields in CONTRACT.items():
-        message = file.message_type.add(name=name)
-        for field in fields.split(", ") if fields else []:
-            called, kind, number = field.split()
-            one = message.field.add(name=called, number=int(number))
-            one.label = codes.LABEL_REPEATED if "*" in kind else codes.LABEL_OPTIONAL
-            kind = kind.strip("*")
-            one.type = (
-                codes.TYPE_MESSAGE if kind in CONTRACT else codes.Type.Value(f"TYPE_{kind.upper()}")
-            )
-            if kind in CONTRACT:
-                one.type_name = f".c.{kind}"
-    pool = descriptor_pool.DescriptorPool()
-    pool.Add(file)
-    return {
-        name: message_factory.GetMessageClass(pool.FindMessageTypeByName(f"c.{name}"))
-        for name in CONTRACT
-    }
-
-
-M = classes()
+M = classes(CONTRACT)
 
 
 def plan(request, egomotion, speed=5.0, n=20, step=0.1):
