@@ -150,8 +150,24 @@ def test_a_plan_is_taken_with_its_speeds(server, driver, h):
     np.testing.assert_allclose(found.time, np.arange(21) * 0.1, atol=1e-9)
     np.testing.assert_allclose(found.v[0], 3.0 + 2.0 * found.time, atol=1e-4)
     np.testing.assert_allclose(found.h[0], h, atol=1e-6)
-    past = found.time[0]
-    assert past == 0.0
+
+
+def test_a_plan_on_the_route_beside_the_vehicle_is_a_path_beside_it(server, driver):
+    """The first pose is where the vehicle is: from there to the others it does not go."""
+
+    def aside(request, context):
+        answer = plan(request, there.egomotion)
+        for one in answer.trajectory.poses[1:]:
+            one.pose.vec.y += 0.6
+        return answer
+
+    there = server(drive=aside)
+    one = driver(there.spec)
+    start(one)
+    found, _ = asked(one, h=0.0)
+    np.testing.assert_allclose(found.v[0], 5.0, atol=1e-4)
+    np.testing.assert_allclose(found.y[0], 20.6, atol=1e-5)
+    np.testing.assert_allclose(found.x[0], 10.0 + 5.0 * found.time, atol=1e-4)
 
 
 def aborts(code, text):
@@ -161,6 +177,13 @@ def aborts(code, text):
 def short(n):
     return lambda request, context: M["DriveResponse"](
         trajectory={"poses": [{"timestamp_us": request.time_now_us + k} for k in range(n)]}
+    )
+
+
+def nowhere(request, context):
+    pose = {"vec": {"x": np.inf}, "quat": {"w": 1.0}}
+    return M["DriveResponse"](
+        trajectory={"poses": [{"timestamp_us": k, "pose": pose} for k in range(4)]}
     )
 
 
@@ -178,8 +201,9 @@ def ends(request, context):
         (b"\x12\x05\x0a", "answered nonsense", "cut off"),
         (b"\x10\x01", "answered nonsense", "trajectory"),
         (M["Empty"](), "answered nonsense", "camera images"),
-        (short(1), "answered nonsense", "2 poses"),
-        (short(2), "answered nonsense", "quaternion"),
+        (short(2), "answered nonsense", "3 poses"),
+        (short(3), "answered nonsense", "quaternion"),
+        (nowhere, "answered nonsense", "finite"),
     ],
 )
 def test_a_bad_answer_costs_one_clear_error(server, driver, answer, kind, message):

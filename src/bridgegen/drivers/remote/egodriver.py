@@ -337,33 +337,40 @@ def _waypoints(seen: Observation) -> list[Parts]:
 
 
 def _plan(poses: list[dict[str, Any]], now: int) -> Trajectory:
-    """Return the part of a plan from now on; its speeds are those of its positions.
+    """Return the part of a plan from now on; its speeds are those along its path.
 
     Raises:
-        WireError: it is empty, or has a pose without a place or a direction.
+        WireError: it is too short, or has a pose without a direction.
     """
     ahead = [pose for pose in poses if pose["timestamp_us"] >= now]
-    if len(ahead) < 2:
+    if len(ahead) < 3:
         raise WireError(
-            f"a plan must have 2 poses from now on, got {len(ahead)} of {len(poses)}; a driver "
+            f"a plan must have 3 poses from now on, got {len(ahead)} of {len(poses)}; a driver "
             "that waits for camera images plans nothing, and none are rendered"
         )
-    when = [1e-6 * (pose["timestamp_us"] - now) for pose in ahead]
+    when = np.array([1e-6 * (pose["timestamp_us"] - now) for pose in ahead])
+    if not (np.diff(when) > 0.0).all():
+        raise WireError("a plan's times must increase")
     x, y = (np.array([pose["pose"]["vec"][k] for pose in ahead]) for k in "xy")
     turn = np.array([[pose["pose"]["quat"][k] for k in "wxyz"] for pose in ahead])
     off = np.abs(np.hypot(np.hypot(turn[:, 0], turn[:, 1]), np.hypot(turn[:, 2], turn[:, 3])) - 1)
+    if not np.isfinite(x + y).all():
+        raise WireError("a pose's place must be finite")
     if not (off <= _UNIT).all():  # nor is it where something is not finite
         raise WireError(f"a pose's quaternion must have the length 1, got {turn[np.argmax(off)]}")
-    time_ = np.array(when)
-    if not (np.diff(time_) > 0.0).all():
-        raise WireError("a plan's times must increase")
-    far = np.cumsum(np.hypot(np.diff(x, prepend=x[0]), np.diff(y, prepend=y[0])))
-    # Of the parabola through three states: exact where the plan's acceleration is constant.
-    v = np.gradient(far, time_, edge_order=2) if len(far) > 2 else np.gradient(far, time_)
-    v = np.maximum(v, 0.0)
     w, i, j, k = turn.T
-    h = np.arctan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))
-    return Trajectory(time_, x[np.newaxis], y[np.newaxis], h[np.newaxis], v[np.newaxis])
+    h = np.unwrap(np.arctan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)))
+    middle = h[:-1] + 0.5 * np.diff(h)
+    far = np.cumsum(np.diff(x) * np.cos(middle) + np.diff(y) * np.sin(middle))
+    # Of the parabola through three states: exact where the plan's acceleration is constant.
+    v = np.gradient(far, when[1:], edge_order=2) if len(far) > 2 else np.gradient(far, when[1:])
+    # The first pose is the one that was sent. Others may lie on the route, beside it: that jump is
+    # no path. So the path goes straight back from the second one; the controller steers towards it.
+    before = when[1] - when[0]
+    v = np.maximum(np.append(v[0] - before * (v[1] - v[0]) / (when[2] - when[1]), v), 0.0)
+    back, h[0] = 0.5 * before * (v[0] + v[1]), h[1]
+    x[0], y[0] = x[1] - back * np.cos(h[1]), y[1] - back * np.sin(h[1])
+    return Trajectory(when, x[np.newaxis], y[np.newaxis], h[np.newaxis], v[np.newaxis])
 
 
 def _microseconds(seconds: float) -> int:
