@@ -75,7 +75,8 @@ class DriverProcess:
         if not is_spec(spec):
             raise InputError(
                 "a driver is named package.module:Class, file.py:Class, file.fmu, "
-                f"connect:HOST:PORT, unix:PATH or exec:COMMAND; got '{spec}'"
+                "connect:HOST:PORT, unix:PATH, exec:COMMAND or egodriver://HOST:PORT; "
+                f"got '{spec}'"
             )
         self.spec = spec
         self.time_limit = time_limit

@@ -1,5 +1,7 @@
 """A co-simulation unit (FMI 2.0 or 3.0) as a driver, one instance per scenario.
 
+One that is a traffic participant of OSMP is `bridgegen.drivers.osmp`'s.
+
 Needs the extra ``fmi``. The inputs that the unit has are set by name:
 
 - ``x y h v a target_speed offset stop_distance light`` as in `Observation`; ``stop_distance`` is

@@ -243,7 +243,7 @@ class Egodriver:
         """
         self._calls.allow(self.seconds)
         self._session = self._calls.begin(int(scene.seed[0]))
-        self._scene, self._before = scene, (0.0, math.nan)
+        self._scene, self._before = scene, (math.nan, 0.0)
 
     def act(self, observation: Observation) -> Trajectory:
         """See `BatchDriver`.
@@ -287,8 +287,8 @@ class Egodriver:
         """Return the motion in the frame of the vehicle; its turn is that since the last call."""
         v, h = float(seen.v[0]), float(seen.h[0])
         before, self._before = self._before, (seen.time, h)
-        turned = math.remainder(h - before[1], 2.0 * math.pi)
-        rate = 0.0 if math.isnan(turned) else turned / (seen.time - before[0])
+        since, turned = seen.time - before[0], math.remainder(h - before[1], 2.0 * math.pi)
+        rate = turned / since if since > 0.0 else 0.0
         return _message(
             "DynamicState",
             angular_velocity=_vector(0.0, 0.0, rate),

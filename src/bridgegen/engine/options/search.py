@@ -62,7 +62,7 @@ class PipelineOptions(Declared):
             TEXT,
             "Driver of the ego, see 'bridgegen list drivers'; or your own: module:Class, "
             "file.py:Class (or :function, compiled), file.fmu, connect:HOST:PORT, unix:PATH, "
-            "'exec:COMMAND'.",
+            "'exec:COMMAND', egodriver://HOST:PORT.",
             shown="the scenario's choice",
             group=OF_DRIVER,
             names="driver",
