@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,9 +40,6 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.outline import lights
 from bridgegen.simulation.osi.mcap import mcap
 from bridgegen.simulation.rollout import Rollout
-
-if TYPE_CHECKING:
-    pass
 
 GROUND_TRUTH, SENSOR_VIEW = "GroundTruth", "SensorView"
 ENDINGS = {GROUND_TRUTH: "_gt.mcap", SENSOR_VIEW: "_sv.mcap"}
@@ -136,10 +132,8 @@ def ground_truths(
 
 def _object(rollout: Rollout, row: int, e: int, n: int) -> Parts:
     """Return a participant at its n instants."""
-    known = len(rollout.kinds) and rollout.kinds[e] >= 0
-    kind = kinds.NAMES[rollout.kinds[e]] if known else ""
+    kind, height = _kind_of(rollout, e), height_of(rollout, e)
     length, width, ahead = rollout.box[e].tolist()
-    height = kinds.HEIGHTS[rollout.kinds[e]] if known else _HEIGHT
     x, y, h, v, a = (getattr(rollout, name)[row, e, :n] for name in ("x", "y", "h", "v", "a"))
     cos, sin = elementary.cos(h), elementary.sin(h)
     rate = np.gradient(h, rollout.time_step) if n > 1 else np.zeros(n)
@@ -161,6 +155,17 @@ def _object(rollout: Rollout, row: int, e: int, n: int) -> Parts:
         ahead=ahead,
         name=rollout.names[e],
     )
+
+
+def _kind_of(rollout: Rollout, e: int) -> str:
+    known = len(rollout.kinds) and rollout.kinds[e] >= 0
+    return kinds.NAMES[rollout.kinds[e]] if known else ""
+
+
+def height_of(rollout: Rollout, e: int) -> float:
+    """Return the usual height of a participant's kind [m]."""
+    kind = _kind_of(rollout, e)
+    return kinds.HEIGHTS[kinds.NAMES.index(kind)] if kind else _HEIGHT
 
 
 def _environment(weather: Float) -> Parts:
