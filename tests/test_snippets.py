@@ -322,9 +322,9 @@ def test_every_snippet_runs(name, page):
 def test_few_snippets_cannot_be_run():
     found = [block for name in PAGES for block in blocks(name) if block.mark == "not run"]
     why = ("esmini", "CARLA", "extra parquet", "server", "planner", "350 MB", "the recordings",
-           "co-simulation unit")  # fmt: skip
+           "co-simulation unit", "another project")  # fmt: skip
     assert all(any(one in block.value for one in why) for block in found)
-    assert len(found) <= 25
+    assert len(found) <= 26
 
 
 def test_marks_are_those_that_are_known():
