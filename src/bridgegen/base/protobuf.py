@@ -26,11 +26,8 @@ _SCALARS = {
     "uint32": 13,
 }  # fmt: skip
 """Codes of types in descriptor.proto."""
-_FIXED = {
-    "double": (_DOUBLE, struct.Struct("<d")),
-    "fixed64": (_DOUBLE, struct.Struct("<Q")),
-    "float": (_FLOAT, struct.Struct("<f")),
-}
+_FORMATS = {"double": (_DOUBLE, "<d"), "fixed64": (_DOUBLE, "<Q"), "float": (_FLOAT, "<f")}
+_FIXED = {kind: (wire, struct.Struct(format_)) for kind, (wire, format_) in _FORMATS.items()}
 """Types of a fixed length: their type on the wire, their format."""
 _MESSAGE, _ENUM, _OPTIONAL, _REPEATED = 11, 14, 1, 3
 
@@ -91,19 +88,18 @@ class Schema:
             return nested(number, value)
         if kind in _FIXED:
             wire, format_ = _FIXED[kind]
-            return [_key(number, wire), value if _varies(value) else format_.pack(value)]
+            return [
+                _key(number, wire),
+                value if isinstance(value, np.ndarray) else format_.pack(value),
+            ]
         if kind == "string":
             return nested(number, [value.encode()])
         if kind in self.values and isinstance(value, str):
             value = self.values[kind].index(value)
-        return [_key(number, _VARINT), value if _varies(value) else varint(value)]
+        return [_key(number, _VARINT), value if isinstance(value, np.ndarray) else varint(value)]
 
     def read(self, kind: str, data: bytes) -> dict[str, Any]:
-        """Return the declared fields of a message; what is not declared is skipped.
-
-        Args:
-            kind: its name.
-            data: the message.
+        """Return the declared fields of a message of a kind; what is not declared is skipped.
 
         Returns:
             By name: a number, a text, a message in the same form; a list of these where the field
@@ -217,10 +213,6 @@ def _fields(name: str, text: str) -> dict[str, _Field]:
         field: _Field((name if kind[0] == "." else "") + kind.strip("*"), int(number), "*" in kind)
         for field, kind, number in each
     }
-
-
-def _varies(value: Any) -> bool:
-    return isinstance(value, np.ndarray)
 
 
 def _key(number: int, wire_type: int) -> bytes:

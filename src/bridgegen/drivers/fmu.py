@@ -79,11 +79,7 @@ class FmuDriver:
         self._bind(path)
 
     def _bind(self, path: Path | str) -> None:
-        """Find the inputs and outputs that the unit has.
-
-        Raises:
-            InputError: the name of one is unknown.
-        """
+        """Find the inputs and outputs that the unit has; raise `InputError`."""
         about = self._description
         self._inputs = {
             variable.name: variable.valueReference

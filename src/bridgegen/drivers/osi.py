@@ -104,7 +104,7 @@ OSI = Schema("osi3", MESSAGES, ENUMS)
 message, VALUES = OSI.message, OSI.values
 
 REACH = 150.0
-"""Largest distance of a lane from the rectangle that holds all participants [m]."""
+"""Largest distance of a lane from the rectangle that holds all places [m]."""
 STRAIGHT = 0.02
 """Largest distance of a line from its points that are left out [m]."""
 
@@ -177,13 +177,9 @@ def moving_object(
     Args:
         number: its id.
         kind: its name in `kinds.NAMES`; "" where it is unknown.
-        box: length, width, height [m].
-        position: of the box's centre [m].
-        yaw: its heading [rad].
-        velocity: of the box's centre [m/s].
+        box: length, width, height [m]; position, velocity and acceleration are of its centre.
+        position: [m]; velocity [m/s]; acceleration [m/s²]; yaw [rad] and its rate [rad/s].
         lit: its lamps, see `kinds`.
-        acceleration: of the box's centre [m/s²].
-        rate: of its turn [rad/s].
         ahead: of the box's centre, from the rear axle's [m].
         name: in the scenario's file.
     """
@@ -231,7 +227,7 @@ def _lights(lit: Any) -> Parts:
 
 
 def lanes_near(
-    lanes: Sequence["Lane"], places: Float, first: int, reach: float = REACH
+    lanes: Sequence["Lane"], places: Float, first: int
 ) -> tuple[Parts, dict[str, Parts], int]:
     """Return the lanes near places with their borders, the lanes' ids, and the next id.
 
@@ -239,9 +235,8 @@ def lanes_near(
         lanes: all.
         places: ``(2, K)`` x and y [m].
         first: the first id that is free.
-        reach: largest distance of a lane from the rectangle that holds the places [m].
     """
-    low, high = places.min(1) - reach, places.max(1) + reach
+    low, high = places.min(1) - REACH, places.max(1) + REACH
     near = [
         lane
         for lane in lanes

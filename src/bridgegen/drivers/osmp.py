@@ -77,8 +77,7 @@ class OsmpDriver(FmuDriver):
             parts = [named[part] for role in _ROLES if (part := name + role) in named]
             if len(parts) == len(_ROLES):
                 self._variables[name] = parts
-        lacking = [name for name in (_VIEW, UPDATE) if name not in self._variables]
-        if lacking:
+        if lacking := [name for name in (_VIEW, UPDATE) if name not in self._variables]:
             raise InputError(
                 f"{path}: a traffic participant of OSMP must have {_VIEW} and {UPDATE}, each as "
                 f"FMI 2.0's integers {', '.join(_ROLES)}; it lacks {', '.join(lacking)}"
@@ -148,22 +147,16 @@ class OsmpDriver(FmuDriver):
     def _command(self, seen: Observation, i: int, time: int) -> bytes:
         """Return a TrafficCommand: the target speed, and the route as a path."""
         number = 2 * (time // _EVERY)
-        points = [
-            _message("StatePoint", position=vector(x, y)) for x, y in seen.route[i, :, :2].tolist()
-        ]
+        places = (vector(x, y) for x, y in seen.route[i, :, :2].tolist())
+        points = [_message("StatePoint", position=place) for place in places]
         first, second = (_message("Header", action_id=identifier(number + k)) for k in (1, 2))
-        speed = _message(
-            "Speed", action_header=first, absolute_target_speed=float(seen.target_speed[i])
-        )
+        target = float(seen.target_speed[i])
+        speed = _message("Speed", action_header=first, absolute_target_speed=target)
         path = _message("Path", action_header=second, path_point=points)
-        actions = [
-            _message("TrafficAction", speed_action=speed),
-            _message("TrafficAction", follow_path_action=path),
-        ]
-        me = identifier(_EGO)
-        return flat(
-            _message("TrafficCommand", **stamped(time), traffic_participant_id=me, action=actions)
-        )
+        both = ({"speed_action": speed}, {"follow_path_action": path})
+        head = {**stamped(time), "traffic_participant_id": identifier(_EGO)}
+        actions = [_message("TrafficAction", **each) for each in both]
+        return flat(_message("TrafficCommand", **head, action=actions))
 
     def _end(self, data: bytes) -> tuple[float, ...]:
         """Return x, y, heading and speed of the rear axle's centre in a TrafficUpdate."""

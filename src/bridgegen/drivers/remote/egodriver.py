@@ -81,7 +81,7 @@ class Calls:
         extends: whether it declares carla-driver-interface's extension.
 
     Raises:
-        InputError: the extra is missing, nobody answers there, or another service does.
+        InputError: the extra is missing, or no such service answers there.
     """
 
     def __init__(self, address: Grpc, error: type[CallError]) -> None:
@@ -130,53 +130,37 @@ class Calls:
         self._seconds, self._until = seconds, time.monotonic() + seconds
 
     def begin(self, seed: int) -> str:
-        """Start a session; return its id. One that is open is closed.
-
-        Raises:
-            CallError: it was not answered.
-        """
+        """Start a session, after what is open was closed; return its id; raise `CallError`."""
         for session in self._open[:]:
             self._open.remove(session)
             self.ask("close_session", _message("DriveSessionCloseRequest", session_uuid=session))
         session = str(uuid.uuid4())  # several workers may ask one server
-        vehicle = _message("RolloutSpec", vehicle=[])
-        request = _message(
-            "DriveSessionRequest", session_uuid=session, random_seed=seed, rollout_spec=vehicle
-        )
+        spec = _message("RolloutSpec", vehicle=[])
+        named = {"session_uuid": session, "random_seed": seed}
+        request = _message("DriveSessionRequest", **named, rollout_spec=spec)
         self.ask("start_session", request)
         self._open.append(session)
         return session
 
     def ask(self, method: str, message: Parts) -> bytes:
-        """Return what a call answers.
-
-        Args:
-            method: its name.
-            message: what is sent.
+        """Return what a method answers to a message.
 
         Raises:
-            CallError: it was not answered. The channel is closed, unless the driver reports an
-                error.
+            CallError: nothing. The channel is closed, unless the driver reports an error.
         """
         import grpc
 
         seconds = max(self._until - time.monotonic(), 0.0)
         try:
-            answer: bytes = self._of(method)(
-                flat(message), timeout=seconds, metadata=self._metadata
-            )
-            return answer
+            call = self._of(method)
+            return bytes(call(flat(message), timeout=seconds, metadata=self._metadata))
         except grpc.RpcError as problem:
             code = problem.code()
-            if code not in (
-                grpc.StatusCode.DEADLINE_EXCEEDED,
-                grpc.StatusCode.UNAVAILABLE,
-                grpc.StatusCode.CANCELLED,
-            ):
+            if code.name not in ("DEADLINE_EXCEEDED", "UNAVAILABLE", "CANCELLED"):
                 raise self.error(RAISED, f"{self.name}, {method}: {_told(problem)}") from None
             self._open.clear()  # who does not answer is not asked to close
             self._end()
-            if code is grpc.StatusCode.DEADLINE_EXCEEDED:
+            if code.name == "DEADLINE_EXCEEDED":
                 text = f"no answer to {method} within {self._seconds:g} s"
                 raise self.error("timed out", text) from None
             raise self.error("died", f"{method}: {_told(problem)}") from None
@@ -201,9 +185,8 @@ def _close(channel: Any, sessions: list[str]) -> None:
 
 def _told(problem: Any) -> str:
     """Return what went wrong in a call, in a line."""
-    if isinstance(problem, WireError):
-        return one_line(str(problem))
-    return one_line(f"{problem.code().name}: {problem.details() or ''}")
+    is_ours = isinstance(problem, WireError)
+    return one_line(str(problem) if is_ours else f"{problem.code().name}: {problem.details()}")
 
 
 class Egodriver:
@@ -211,10 +194,7 @@ class Egodriver:
 
     Args:
         calls: of its server.
-        seconds: time limit of each of its calls from now on [s].
-
-    Attributes:
-        seconds: likewise; new ones hold from the next call on.
+        seconds: time limit of each of its calls [s]; new ones hold from the next call on.
 
     Raises:
         CallError: it starts no session without cameras.
@@ -253,11 +233,13 @@ class Egodriver:
         """
         calls, session = self._calls, self._session
         calls.allow(self.seconds)
-        now = _microseconds(observation.time)
+        now = round(1e6 * observation.time)
+        place = _pose(*(float(each[0]) for each in (observation.x, observation.y, observation.h)))
+        pose = _message("PoseAtTime", pose=place, timestamp_us=now)
         egomotion = _message(
             "RolloutEgoTrajectory",
             session_uuid=session,
-            trajectory=_message("Trajectory", poses=[self._pose_now(observation, now)]),
+            trajectory=_message("Trajectory", poses=[pose]),
             dynamic_states=[self._motion(observation)],
         )
         route = _message("Route", waypoints=_waypoints(observation), timestamp_us=now)
@@ -265,7 +247,7 @@ class Egodriver:
             "DriveRequest",
             session_uuid=session,
             time_now_us=now,
-            time_query_us=now + _microseconds(self.period),
+            time_query_us=now + round(1e6 * self.period),
             renderer_data=self._around(observation, now) if calls.extends else None,
         )
         calls.ask("submit_egomotion_observation", egomotion)
@@ -278,10 +260,6 @@ class Egodriver:
             return _plan(response["trajectory"]["poses"], now)
         except WireError as error:
             raise calls.error(NONSENSE, f"{calls.name}, drive: {error}") from None
-
-    def _pose_now(self, seen: Observation, now: int) -> Parts:
-        pose = _pose(float(seen.x[0]), float(seen.y[0]), 0.0, float(seen.h[0]))
-        return _message("PoseAtTime", pose=pose, timestamp_us=now)
 
     def _motion(self, seen: Observation) -> Parts:
         """Return the motion in the frame of the vehicle; its turn is that since the last call."""
@@ -323,7 +301,7 @@ def _actor(number: int, track: list[float]) -> Parts:
         "CarlaActorState",
         track_id=str(number),
         type_id=OBJECT_CLASSES[int(track[8])].carla[0],
-        pose_local_to_aabb=_pose(x, y, 0.5 * height, heading),
+        pose_local_to_aabb=_pose(x, y, heading, 0.5 * height),
         aabb=_message("AABB", size_x=length, size_y=width, size_z=height),
         dynamic_state=_message("DynamicState", linear_velocity=_vector(vx, vy)),
     )
@@ -373,14 +351,10 @@ def _plan(poses: list[dict[str, Any]], now: int) -> Trajectory:
     return Trajectory(when, x[np.newaxis], y[np.newaxis], h[np.newaxis], v[np.newaxis])
 
 
-def _microseconds(seconds: float) -> int:
-    return round(1e6 * seconds)
-
-
 def _vector(x: float, y: float = 0.0, z: float = 0.0) -> Parts:
     return _message("Vec3", x=x, y=y, z=z)
 
 
-def _pose(x: float, y: float, z: float, heading: float) -> Parts:
+def _pose(x: float, y: float, heading: float, z: float = 0.0) -> Parts:
     turn = _message("Quat", w=math.cos(0.5 * heading), x=0.0, y=0.0, z=math.sin(0.5 * heading))
     return _message("Pose", vec=_vector(x, y, z), quat=turn)
