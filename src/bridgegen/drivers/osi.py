@@ -177,9 +177,13 @@ def moving_object(
     Args:
         number: its id.
         kind: its name in `kinds.NAMES`; "" where it is unknown.
-        box: length, width, height [m]; position, velocity and acceleration are of its centre.
-        position: [m]; velocity [m/s]; acceleration [m/s²]; yaw [rad] and its rate [rad/s].
+        box: length, width, height [m].
+        position: of the box's centre [m].
+        yaw: its heading [rad].
+        velocity: of the box's centre [m/s].
         lit: its lamps, see `kinds`.
+        acceleration: of the box's centre [m/s²].
+        rate: of its turn [rad/s].
         ahead: of the box's centre, from the rear axle's [m].
         name: in the scenario's file.
     """

@@ -96,11 +96,7 @@ class OsmpDriver(FmuDriver):
         super().reset(n, scene)
 
     def act(self, observation: Observation) -> Trajectory:
-        """See `BatchDriver`.
-
-        Raises:
-            InputError: a unit gives no update of the ego, or bytes that are none.
-        """
+        """See `BatchDriver`; raise `InputError` where a unit gives no update of the ego."""
         n, time = len(observation.x), round(observation.time * 1e9)
         ends = np.zeros((4, n))
         for i in np.flatnonzero(observation.running).tolist():

@@ -136,8 +136,8 @@ class Calls:
             self.ask("close_session", _message("DriveSessionCloseRequest", session_uuid=session))
         session = str(uuid.uuid4())  # several workers may ask one server
         spec = _message("RolloutSpec", vehicle=[])
-        named = {"session_uuid": session, "random_seed": seed}
-        request = _message("DriveSessionRequest", **named, rollout_spec=spec)
+        about = {"session_uuid": session, "random_seed": seed}
+        request = _message("DriveSessionRequest", **about, rollout_spec=spec)
         self.ask("start_session", request)
         self._open.append(session)
         return session
@@ -216,21 +216,13 @@ class Egodriver:
             ) from None
 
     def reset(self, n: int, scene: Scene) -> None:
-        """See `BatchDriver`.
-
-        Raises:
-            CallError: it was not answered.
-        """
+        """See `BatchDriver`; raise `CallError`."""
         self._calls.allow(self.seconds)
         self._session = self._calls.begin(int(scene.seed[0]))
         self._scene, self._before = scene, (math.nan, 0.0)
 
     def act(self, observation: Observation) -> Trajectory:
-        """See `BatchDriver`.
-
-        Raises:
-            CallError: it was not answered, or not with a plan.
-        """
+        """See `BatchDriver`; raise `CallError`, also where the answer is no plan."""
         calls, session = self._calls, self._session
         calls.allow(self.seconds)
         now = round(1e6 * observation.time)
