@@ -10,11 +10,11 @@ Source: ASAM OpenLABEL 1.0.0, chapter 8, and openlabel_ontology_scenario_tags.tt
 import json
 import uuid
 from collections.abc import Iterator, Mapping
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from bridgegen import __version__
 from bridgegen.drivers import kinds
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
@@ -98,7 +98,7 @@ def openlabel(
         "metadata": {
             "schema_version": SCHEMA_VERSION,
             "tagged_file": f"{name}.xosc",
-            "annotator": f"bridgegen {__version__}",
+            "annotator": f"bridgegen {version('bridgegen')}",
         },
         "ontologies": {
             "0": {
