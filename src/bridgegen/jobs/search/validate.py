@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from bridgegen.base.errors import BridgeGenError, InputError, UnsupportedError
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
+from bridgegen.openx.opendrive.road_map import map_bytes
 from bridgegen.scenario.ontology import reasoner
 from bridgegen.scenario.ontology.graph import Individuals
 
@@ -29,7 +30,7 @@ PLACEHOLDERS = (
 def validate_file(
     path: Path, *, reason: bool = False, warnings: list[str] | None = None
 ) -> list[str]:
-    """Return the problems of an ``.owl``, ``.xodr``, ``.osc``, ``.xosc`` or ``.yaml`` file.
+    """Return the problems of an ``.owl``, ``.xodr``, ``.osm``, ``.osc``, ``.xosc`` or ``.yaml`` file.
 
     An ``.owl`` of a scenario of the catalogue is checked against that scenario's constraints. An
     ``.xosc`` is checked with the map that it names, one with a distribution with its scenario. A
@@ -51,6 +52,7 @@ def validate_file(
     kinds = {
         ".owl": _ontology,
         ".xodr": lambda file: _roads(file, warnings),
+        ".osm": lambda file: _roads(file, warnings),
         ".osc": lambda file: _dsl(file, warnings),
         ".xosc": lambda file: _storyboard(file, warnings),
         ".yaml": _logical,
@@ -144,7 +146,7 @@ def _is_mined(individuals: Individuals) -> bool:
 
 def _roads(path: Path, warnings: list[str] | None) -> list[str]:
     odd: list[str] = []
-    model = opendrive_read.read(path, warnings=odd)
+    model = opendrive_read.read(map_bytes(path, odd), str(path), odd)
     odd += [_placed(path, problem) for problem in opendrive_validate.problems(model)]
     if warnings is None:
         return odd

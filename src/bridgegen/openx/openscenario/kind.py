@@ -25,7 +25,10 @@ def files_named_in(path: Path) -> tuple[Path, ...]:
     for element in parse_xml(path).iter():
         for name, value in element.attrib.items():
             text = str(value)
-            if not (str(name) in _PATHS or text.lower().endswith(".xodr")) or "\0" in text:
+            if (
+                not (str(name) in _PATHS or text.lower().endswith((".xodr", ".osm")))
+                or "\0" in text
+            ):
                 continue
             named = path.parent / text
             some = sorted(named.glob("*.xosc")) if named.is_dir() else [named]
