@@ -15,6 +15,7 @@ from bridgegen.openx.openscenario import write as openscenario_write
 from bridgegen.openx.openscenario.from_owl.scenario import openscenario_from_owl
 from bridgegen.openx.openscenario.parameters import EGO, ego_of, rename_entity
 from bridgegen.openx.openscenario.pruning import NEVER, read_empty_triggers
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.prepared import logic_path, prepared, roads_of
 from bridgegen.scenario.language.reader import entry_names, pack_names
@@ -103,7 +104,7 @@ def import_file(
     named, file = file, map_path(file)
     out = out or (file if file == named else Path(named.name)).with_suffix(".owl")
     notes: list[str] = []
-    if file.suffix.lower() == ".xosc":
+    if is_storyboard(file):
         individuals, notes = _import_storyboard(file, out, partial, ego, strict, empty_trigger)
     elif partial or strict or ego is not None or empty_trigger != NEVER:
         raise InputError(

@@ -38,7 +38,8 @@ from bridgegen.openx.xml import parse_xml
 
 DRIVEN = ("driving", "bus", "bidirectional")
 LANELET = "lanelet"
-"""The ``userData`` of a lane that says which lanelet is where: its id, s at its start and end."""
+"""The ``userData`` of a lane that says which lanelet is where: its id, s at its start and end, and
+its length."""
 MARKS = {
     "solid": "solid",
     "dashed": "broken",
@@ -97,14 +98,15 @@ def roads_of_lanelets(root: etree._Element, place: str, notes: Notes) -> OpenDri
     return _Network(found, place, notes).model()
 
 
-def lanelets_of(model: OpenDrive) -> dict[str, tuple[str, int, float, float]]:
-    """Return where lanelets are in a converted map: road, lane, s at their start and end [m]."""
-    found: dict[str, tuple[str, int, float, float]] = {}
+def lanelets_of(model: OpenDrive) -> dict[str, tuple[str, int, float, float, float]]:
+    """Return where lanelets are: road, lane, s at their start and end, and their length [m]."""
+    found: dict[str, tuple[str, int, float, float, float]] = {}
     for road in model.roads:
         for lane in road.sections[0].lanes:
             for value in values_of(lane.user_data, LANELET):
-                key, start, end = value.split()
-                found.setdefault(key, (road.id, lane.id, float(start), float(end)))
+                key, *numbers = value.split()
+                start, end, length = map(float, numbers)
+                found.setdefault(key, (road.id, lane.id, start, end, length))
     return found
 
 
@@ -427,7 +429,9 @@ class _Network:
                 stops.append(float(np.clip(line.project(end[None])[0][0], 0.0, line.length)))
             stops.append(line.length if along else 0.0)
             said = tuple(
-                user_datum(LANELET, f"{lanelet.id} {stops[k]:.3f} {stops[k + 1]:.3f}")
+                user_datum(
+                    LANELET, f"{lanelet.id} {stops[k]:.3f} {stops[k + 1]:.3f} {lanelet.length:.3f}"
+                )
                 for k, lanelet in enumerate(lanelets)
             )
             speeds = (

@@ -109,6 +109,12 @@ class Lanelet:
         return centre_line(self.left.points, self.right.points)
 
     @property
+    def length(self) -> float:
+        """Of its centre line [m]."""
+        steps = np.diff(self.centre[:, :2], axis=0)
+        return float(np.sum(np.sqrt(np.sum(steps * steps, axis=1)))) or 1e-3
+
+    @property
     def start(self) -> tuple[int, int]:
         """The nodes at its start, left and right."""
         return self.left.nodes[0], self.right.nodes[0]
