@@ -186,7 +186,8 @@ class _Reader:
     def read(self) -> LaneletMap:
         places, header = self._places()
         ways = {item[0]: way for item in self._items("way") if (way := self._way(item, places))}
-        relations = list(self._items("relation"))
+        # What is wrong with these would be said again of all that is made of them.
+        relations = [] if self.problems else list(self._items("relation"))
         rules = {
             key: self._rule(key, element, tags, ways)
             for key, element, tags in relations

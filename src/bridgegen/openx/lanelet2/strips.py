@@ -19,7 +19,7 @@ from bridgegen.openx.opendrive.geometry import along_arc
 from bridgegen.openx.opendrive.plan_view import Arc, Cubic, Geometry, Line
 
 STEP = 0.05  # m, between two points of a border that its cubics are held against
-TOLERANCE = 0.003  # m, of a border's cubics
+TOLERANCE = 0.005  # m, of a border's cubics
 LEAST_CUBIC = 0.1  # m, length of the shortest of them
 SMOOTH = 2.0  # m to both sides, over which a reference line is smoothed
 LONGEST = 12.0  # m, between two nodes of a reference line
@@ -399,24 +399,27 @@ def _project(arcs: Float, points: Float) -> tuple[Float, Float]:
 
 
 def _knots(values: Float, slopes: Float, step: float) -> list[int]:
-    """Return which points of a grid cubics between them suffice for."""
-    ends, kept = [values.shape[1] - 1], [0]
-    least = max(2, round(LEAST_CUBIC / step))
-    while ends:
-        i, j = kept[-1], ends[-1]
-        u = np.arange(j - i + 1) / (j - i)
-        d = (j - i) * step
-        h = (1 + 2 * u) * (1 - u) ** 2, u * (1 - u) ** 2, u**2 * (3 - 2 * u), u**2 * (u - 1)
-        fit = (
-            values[:, i, None] * h[0]
-            + slopes[:, i, None] * d * h[1]
-            + values[:, j, None] * h[2]
-            + slopes[:, j, None] * d * h[3]
-        )
-        if j - i >= 2 * least and np.max(np.abs(fit - values[:, i : j + 1])) > TOLERANCE:
-            ends.append((i + j) // 2)
-        else:
-            kept.append(ends.pop())
+    """Return which points of a grid cubics between them suffice for: each reaches far."""
+    last, kept = values.shape[1] - 1, [0]
+    least = max(1, round(LEAST_CUBIC / step))
+
+    def fits(i: int, j: int) -> bool:
+        u, d = np.arange(j - i + 1) / (j - i), (j - i) * step
+        fit = np.outer(values[:, i], (1 + 2 * u) * (1 - u) ** 2)
+        fit += np.outer(values[:, j], u**2 * (3 - 2 * u))
+        fit += np.outer(d * slopes[:, i], u * (1 - u) ** 2)
+        fit += np.outer(d * slopes[:, j], u**2 * (u - 1))
+        return bool(np.max(np.abs(fit - values[:, i : j + 1])) <= TOLERANCE)
+
+    while (i := kept[-1]) < last:
+        good, bad = min(least, last - i), last - i + 1
+        while good * 2 < bad and fits(i, i + good * 2):
+            good *= 2
+        bad = min(bad, good * 2)
+        while bad - good > 1:
+            middle = (good + bad) // 2
+            good, bad = (middle, bad) if fits(i, i + middle) else (good, middle)
+        kept.append(i + good)
     return kept
 
 
