@@ -168,7 +168,9 @@ def read_lanelets(root: etree._Element, place: str, notes: Notes) -> LaneletMap:
     reader = _Reader(root, notes)
     found = reader.read()
     if reader.problems or not found.lanelets:
-        problems = sorted(reader.problems) or [(root.sourceline or 0, "a lanelet is required")]
+        problems = sorted(reader.problems) or [
+            (root.sourceline or 0, "a lanelet is required; OpenStreetMap itself has none")
+        ]
         more = [f"{place}: and {len(problems) - SHOWN} more"] if len(problems) > SHOWN else []
         raise FileFormatError(
             *(f"{place}, line {line}: {problem}" for line, problem in problems[:SHOWN]), *more
