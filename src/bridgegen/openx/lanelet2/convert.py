@@ -48,6 +48,7 @@ MARKS = {
     "dashed_solid": "broken solid",
 }
 """OpenDRIVE's type of a line, by Lanelet2's subtype."""
+SHORT = 2.0  # m, length of a road that keeps its heading
 CLEARANCE = 3.0  # m, between the heights of lanelets that cross on two levels
 MOST_PATHS = 5000  # through the junctions of a map
 
@@ -299,7 +300,7 @@ class _Network:
     # -- where roads meet --------------------------------------------------------------------------
 
     def _cuts(self, strips: list[Strip]) -> dict[End, Cut]:
-        sets = _Sets()
+        sets, alike = _Sets(), _Sets()
         for strip in strips:
             for contact in CONTACTS:
                 edges = [strip.key(k, contact) for k in range(len(strip.lanes))]
@@ -310,6 +311,9 @@ class _Network:
         for strip in strips:
             for contact in CONTACTS:
                 head = sets.find(strip.key(0, contact))
+                # Lanes fold in a road that is too short to turn from one heading to another.
+                if min(item[0].length for item, _ in strip.lanes) < SHORT:
+                    alike.join(head, sets.find(strip.key(0, CONTACTS[contact == "start"])))
                 for lanelets, along in strip.lanes:
                     starts = along == (contact == "start")
                     lanelet = lanelets[0 if starts else -1]
@@ -321,7 +325,12 @@ class _Network:
                 drawn[head] += [
                     (key, points if contact == "start" else points[::-1]) for key, points in keyed
                 ]
-        known = {head: cut_of(list(ends[head].values()), drawn[head]) for head in ends}
+        turned: dict[object, dict[tuple[str, bool], tuple[Lanelet, bool, bool]]] = defaultdict(dict)
+        for head, there in ends.items():
+            turned[alike.find(head)] |= there
+        known = {
+            head: cut_of(list(turned[alike.find(head)].values()), drawn[head]) for head in ends
+        }
         found = {}
         for strip in strips:
             for contact in CONTACTS:

@@ -270,9 +270,10 @@ def shape(strip: Strip, start: Cut, end: Cut) -> Shape:
         fixed.append(2.0 * line - fixed[-1])
     signs = np.array([(-1.0) ** k for k in range(len(borders))])[:, None]
     t = np.array(fixed) + signs * np.mean(signs * (t - np.array(fixed)), axis=0)
-    for k in range(len(centres)):
-        over = 0.5 * np.maximum(t[k + 1] - t[k], 0.0)
-        t[k], t[k + 1] = t[k] + over, t[k + 1] - over
+    for k in range(strip.centre + 1, len(borders)):
+        t[k] = np.minimum(t[k], t[k - 1])
+    for k in range(strip.centre - 1, -1, -1):
+        t[k] = np.maximum(t[k], t[k + 1])
     window = max(1, min(round(0.5 * LEAST_CUBIC / STEP), count // 4))
     padded = np.pad(t, ((0, 0), (window, window)), mode="edge")
     spread = np.minimum(np.arange(count + 1) + window, count) - np.maximum(
