@@ -20,7 +20,7 @@ from bridgegen.openx.opendrive.plan_view import Arc, Cubic, Geometry, Line
 
 STEP = 0.05  # m, between two points of a border that its cubics are held against
 TOLERANCE = 0.005  # m, of a border's cubics
-LEAST_CUBIC = 0.1  # m, length of the shortest of them
+LEAST_CUBIC = 0.05  # m, length of the shortest of them
 SMOOTH = 2.0  # m to both sides, over which a reference line is smoothed
 LONGEST = 12.0  # m, between two nodes of a reference line
 CLOSEST = 2.0  # m, likewise
