@@ -72,7 +72,7 @@ MANY = 20
 
 _RARE = (
     "adversary ahead axes carla-command carla-timeout cause causes count detector distinct "
-    "distribution empty-trigger esmini-lib exposure host ideal maps metrics name objectives "
+    "distribution empty-trigger esmini-lib exposure host ideal maps metrics name needs objectives "
     "others place port record repeats scale screen screen-batch screen-budget screen-set set "
     "simulator-set time-limit triage vehicle weights workers worse-than"
 )
