@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from lxml import etree
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.lanelet2.furniture import add_furniture
-from bridgegen.openx.lanelet2.read import Bound, Lanelet, LaneletMap, read_lanelets
+from bridgegen.openx.lanelet2.read import DRIVEN, Bound, Lanelet, LaneletMap, read_lanelets
 from bridgegen.openx.lanelet2.strips import Cut, Key, Shape, Strip, cut_of, shape
 from bridgegen.openx.opendrive.mirror import mirrored
 from bridgegen.openx.opendrive.model import (
@@ -36,7 +35,6 @@ from bridgegen.openx.opendrive.user_data import user_datum, values_of
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.openx.xml import parse_xml
 
-DRIVEN = ("driving", "bus", "bidirectional")
 LANELET = "lanelet"
 """The ``userData`` of a lane that says which lanelet is where: its id, s at its start and end, and
 its length."""
@@ -79,24 +77,8 @@ def _converted(data: bytes, place: str) -> tuple[bytes, tuple[str, ...]]:
     if root.tag != "osm":
         raise FileFormatError(f"{place}: the root element must be osm, got {root.tag!s} (line 1)")
     notes = Notes()
-    model = roads_of_lanelets(root, place, notes)
+    model = _Network(read_lanelets(root, place, notes), place, notes).model()
     return to_xml(model), tuple(notes.sentences(place))
-
-
-def roads_of_lanelets(root: etree._Element, place: str, notes: Notes) -> OpenDrive:
-    """Return the road network of a Lanelet2 map.
-
-    Args:
-        root: ``<osm>``.
-        place: what to call it in messages.
-        notes: takes what is not represented.
-
-    Raises:
-        FileFormatError: as of `bridgegen.openx.lanelet2.read.read_lanelets`; lanelets of which no
-            road can be made.
-    """
-    found = read_lanelets(root, place, notes)
-    return _Network(found, place, notes).model()
 
 
 def lanelets_of(model: OpenDrive) -> dict[str, tuple[str, int, float, float, float]]:

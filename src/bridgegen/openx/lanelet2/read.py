@@ -37,6 +37,7 @@ LANE_TYPES = {
 }
 """OpenDRIVE's type of lane, by Lanelet2's or Autoware's subtype; a crosswalk becomes an object."""
 
+DRIVEN = ("driving", "bus", "bidirectional")
 SPEED_WORDS = {
     "kmh": "km/h",
     "kph": "km/h",

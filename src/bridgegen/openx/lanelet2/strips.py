@@ -196,6 +196,10 @@ class Shape:
         """Return the s and t [m] of points; ``(P,)`` float64 each."""
         return _project(self.arcs, points)
 
+    def at(self, s: float) -> Float:
+        """Return the t [m] of the borders at a place, from left to right; ``(B,)`` float64."""
+        return np.array([np.interp(s, self.stations, row) for row in self.values])
+
     def cubics(
         self, values: Float, slopes: Float, kind: type[C], least: float = -math.inf
     ) -> list[C]:
@@ -365,7 +369,10 @@ def _arcs(nodes: Float) -> Float:
             sine = elementary.sin(half)
             curvature = 2.0 * sine / chord if abs(half) > 1e-7 else 0.0
             length = chord * half / sine if curvature else chord
-            found.append((x, y, h, curvature, length))
+            if found and not curvature and not found[-1][3] and abs(h - found[-1][2]) < 1e-7:
+                found[-1] = (*found[-1][:4], found[-1][4] + length)  # one line, and not two
+            else:
+                found.append((x, y, h, curvature, length))
             x, y, h = along_arc(x, y, h, curvature, length)
             x, y = tx, ty
     return np.array(found).reshape(-1, 5)
