@@ -166,7 +166,7 @@ def test_lights_stop_lines_and_crosswalks_are_where_they_are_drawn(tmp_path: Pat
     model = model_of(tmp_path, crossroads())
     places = {key: place[0] for key, place in lanelets_of(model).items()}
     (light,) = model.road(places["102"]).signals
-    assert (light.id, light.dynamic, light.orientation) == ("201", "yes", "+")
+    assert (light.id, light.name, light.dynamic, light.orientation) == ("201", "32", "yes", "+")
     (line,) = model.road(places["101"]).objects
     assert (line.subtype, line.s) == ("stopLine", pytest.approx(44.0))
     (crosswalk,) = model.road(places["103"]).objects

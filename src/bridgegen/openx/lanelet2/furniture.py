@@ -136,6 +136,7 @@ class _Furniture:
         return Signal(
             rule.id, place.s, place.t, "yes" if light else "no", place.orientation, kind,
             z_offset=_HEIGHT[light], country=country, value=value,
+            name=" ".join(way.id for way in rule.ways.get("refers", ())) or None,
             unit=None if value is None else "km/h", height=0.9, width=0.3 if light else 0.6,
             validity=place.validity,
         )  # fmt: skip

@@ -23,6 +23,7 @@ LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 SUFFIXES = (".yaml", ".yml")
 _ROOT = "OpenSCENARIO"
 MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS = 2**20, 64, 50_000
+MARGIN = 1e-3  # m, from the ends of a lane, to which positions are rounded
 EXITS = ("exitSuccess", "exitFailure")
 """Custom commands that end the scenario, with a verdict."""
 _PACKAGE = re.compile(
@@ -119,7 +120,9 @@ def _composed(data: bytes, place: str) -> list[tuple[str, _Node]]:
             refuse(event, f"tags are refused: {event.tag}")
         if isinstance(event, yaml.ScalarEvent):
             null = not event.style and event.value in ("", "~", "null")
-            made = _Node(line, None if null else event.value)
+            is_truth = not event.style and event.value in ("True", "False", "TRUE", "FALSE")
+            text = event.value.lower() if is_truth else event.value
+            made = _Node(line, None if null else text)
         elif isinstance(event, yaml.SequenceStartEvent):
             items = []
             while not isinstance(inner := next(events), yaml.SequenceEndEvent):
@@ -246,7 +249,20 @@ def _on_roads(root: etree._Element, path: Path, place: str) -> None:
     logic.set("filepath", str(road))
     if road.suffix.lower() != ".osm":
         return
-    lanelets = lanelets_of(read_roads(map_bytes(road), str(road)))
+    model = read_roads(map_bytes(road), str(road))
+    lanelets = lanelets_of(model)
+    lights = {
+        name: signal.id
+        for item in model.roads
+        for signal in item.signals
+        for name in (signal.name or "").split()
+    }
+    for tag, key in (
+        ("TrafficSignalState", "trafficSignalId"),
+        ("TrafficSignalStateAction", "name"),
+    ):
+        for state in root.iter(tag):
+            state.set(key, lights.get(state.get(key, ""), state.get(key, "")))
     problems = []
     for position in root.iter("LanePosition"):
         key, s = position.get("laneId", ""), position.get("s", "0")
@@ -263,7 +279,9 @@ def _on_roads(root: etree._Element, path: Path, place: str) -> None:
         else:
             position.set("roadId", road_id)
             position.set("laneId", str(lane))
-            position.set("s", repr(start + (end - start) * min(max(along, 0.0), 1.0)))
+            s_road = start + (end - start) * along
+            low, high = min(start, end) + MARGIN, max(start, end) - MARGIN
+            position.set("s", repr(max(low, min(s_road, high))))
             offset = position.get("offset", "0")
             if end < start and offset.strip("0.-+"):  # t is the road's, not the lanelet's
                 position.set("offset", offset[1:] if offset.startswith("-") else f"-{offset}")
