@@ -224,7 +224,7 @@ class CommonOptions(PipelineOptions):
         default=None,
         metadata=option(
             PATH,
-            "Map to search on: .xodr, or the .owl that it was imported as.",
+            "Map to search on: .xodr, .osm, or the .owl that it was imported as.",
             spelling="--map",
             shown="the scenario's roads",
         ),
