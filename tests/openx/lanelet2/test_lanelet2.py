@@ -120,6 +120,17 @@ def test_the_centre_of_a_bend_lies_between_its_bounds(tmp_path: Path, radius: fl
     assert np.all(np.abs(away - radius) < 0.006 + sagitta)
 
 
+@pytest.mark.parametrize(("turn", "noted"), [(1.4, False), (1.5 * math.tau, True)])
+def test_a_lane_that_is_not_where_its_lanelet_is_is_noted(
+    tmp_path: Path, turn: float, noted: bool
+) -> None:
+    path = tmp_path / "map.osm"
+    path.write_text(osm({1: arc(4.0, turn, 60), 2: arc(7.5, turn, 60)}, [(11, 1, 2, {})]))
+    notes: list[str] = []
+    map_bytes(path, notes)
+    assert any("lies up to" in note and "lanelet 11" in note for note in notes) is noted
+
+
 def crossroads(**tags: str) -> str:
     """A way to the east and one to the north, each in three lanelets; the middle ones cross."""
     ways = {}

@@ -1,17 +1,20 @@
 """Lanelet2 → OpenDRIVE: which lanelets are one road, where junctions are, what links to what."""
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.lanelet2.furniture import add_furniture
 from bridgegen.openx.lanelet2.read import DRIVEN, Bound, Lanelet, LaneletMap, read_lanelets
-from bridgegen.openx.lanelet2.strips import Cut, Key, Shape, Strip, cut_of, shape
+from bridgegen.openx.lanelet2.strips import Cut, Key, Shape, Strip, cut_of, dense, shape
+from bridgegen.openx.opendrive.lanes import borders, points
 from bridgegen.openx.opendrive.mirror import mirrored
 from bridgegen.openx.opendrive.model import (
     CONTACTS,
@@ -47,6 +50,8 @@ MARKS = {
 }
 """OpenDRIVE's type of a line, by Lanelet2's subtype."""
 SHORT = 2.0  # m, length of a road that keeps its heading
+COMPARED = 0.25  # m, between points at which a lane is compared with its lanelets
+AWAY = 1.0  # m, from which on they are said to lie apart; ends that are cut square are nearer
 CLEARANCE = 3.0  # m, between the heights of lanelets that cross on two levels
 MOST_PATHS = 5000  # through the junctions of a map
 
@@ -358,10 +363,31 @@ class _Network:
         links = self._links(strips)
         junctions = _Junctions(strips, names, links)
         roads = [self._road(strip, shapes[strip.id], names, links, junctions) for strip in strips]
+        for strip, road in zip(strips, roads, strict=True):
+            self._compare(strip, road)
         header = mirrored(self.map.header) if self.map.left_hand else self.map.header
         roads = add_furniture(self.map, strips, shapes, roads, self.notes)
         crossings = junctions.made(self._priorities(strips, names))
         return OpenDrive(header, tuple(roads), (), crossings, left_hand=self.map.left_hand)
+
+    def _compare(self, strip: Strip, road: Road) -> None:
+        """Note lanes that are not where their lanelets are, as where a road is a closed loop."""
+        s = np.linspace(0.0, road.length, max(2, math.ceil(road.length / COMPARED)))
+        t = borders(road, 0, s)
+        for index, line in enumerate(strip.centres()):
+            lane = strip.lane_id(index)
+            ours = points(road, s, 0.5 * (t[lane] + t[lane - (1 if lane > 0 else -1)]))
+            theirs = dense(line, COMPARED)[:, :2]
+            off = max(
+                float(np.max(cKDTree(a).query(b)[0])) for a, b in ((ours, theirs), (theirs, ours))
+            )
+            if off > AWAY:
+                first = strip.lanes[index][0][0]
+                self.notes.add(
+                    "away",
+                    first.line,
+                    f"lanelet {first.id}: its lane lies up to {off:.1f} m beside it",
+                )
 
     def _links(self, strips: list[Strip]) -> dict[End, list[tuple[int, End, int]]]:
         """Return per end of a road: a lane, the end that it is joined to, and the lane there."""

@@ -247,11 +247,11 @@ def shape(strip: Strip, start: Cut, end: Cut) -> Shape:
     heights = np.zeros(count + 1)
 
     def beside(points: Float, first: float, last: float) -> Float:
-        dense = _dense(points, STEP)
-        s, across = _project(arcs, dense[:, :2])
+        close = dense(points, STEP)
+        s, across = _project(arcs, close[:, :2])
         s = np.maximum.accumulate(s)
         inside = (s > 1e-6) & (s < length - 1e-6)
-        heights[:] += np.interp(grid, s, dense[:, 2]) / (2 * len(borders) - 1)
+        heights[:] += np.interp(grid, s, close[:, 2]) / (2 * len(borders) - 1)
         s = np.concatenate(([0.0], s[inside], [length]))
         return np.interp(grid, s, np.concatenate(([first], across[inside], [last])))
 
@@ -307,12 +307,12 @@ def _nodes(line: Float, first: Float, last: Float, start: Cut, end: Cut) -> Floa
     """Return the nodes of a reference line; ``(N, 3)``: x, y [m], heading [rad]."""
     fore = np.array([elementary.cos(start.h), elementary.sin(start.h)])
     aft = np.array([elementary.cos(end.h), elementary.sin(end.h)])
-    line = _dense(line, 0.5)
+    line = dense(line, 0.5)
     ahead, behind = (line - first) @ fore > 0.25, (line - last) @ aft < -0.25
     low = int(np.argmax(ahead)) if ahead.any() else len(line)
     high = len(line) - int(np.argmax(behind[::-1])) if behind.any() else 0
     inner = line[low:high] if low < high else line[:0]
-    line = _dense(np.concatenate((first[None], inner, last[None])), 0.5)
+    line = dense(np.concatenate((first[None], inner, last[None])), 0.5)
     # Bounds jitter: a moving average leaves their course; their borders follow the rest.
     reach = round(SMOOTH / 0.5)
     total = np.cumsum(np.concatenate((np.zeros((1, 2)), line)), axis=0)
@@ -455,7 +455,7 @@ def _along(points: Float, s: Float) -> Float:
     return np.stack([np.interp(s, stations, points[:, k]) for k in range(points.shape[1])], axis=1)
 
 
-def _dense(points: Float, step: float) -> Float:
+def dense(points: Float, step: float) -> Float:
     """Return a line with its own points and others between them, ``step`` [m] apart or less."""
     stations = _stations(points)
     more = np.linspace(0.0, float(stations[-1]), max(2, math.ceil(float(stations[-1]) / step) + 1))
