@@ -1,124 +1,262 @@
-"""A ROS 2 stack as a driver: one scenario at a time, in lock-step by /clock.
+"""Autoware's planning as a driver, without ROS on this side: CDR over Zenoh.
 
-source /opt/ros/jazzy/setup.bash    # and start your stack with use_sim_time:=true
-bridgegen search cut-in --ego "exec:python3 server.py ros2_bridge.py:Ros2Driver"
+zenoh-bridge-ros2dds                # beside Autoware; it listens on port 7447
+pip install eclipse-zenoh           # here
+bridgegen search my.yaml --ego "exec:python server.py ros2_bridge.py:Autoware"
 
-Here, python3 is ROS's; server.py and messages.py are drivers/remote's, copied beside this
-file where BridgeGen is not installed for it. Published at each instant, in this order:
+server.py and messages.py are drivers/remote's, copied beside this file where BridgeGen is not
+installed for this Python (3.10). ZENOH_CONNECT is the bridge's address, tcp/127.0.0.1:7447 if it
+is not set. Published at each instant, every 0.1 s, before /clock:
 
-    /bridgegen/reset          std_msgs/Empty       only when a scenario begins: forget the last one
-    /bridgegen/target_speed   std_msgs/Float64     what the scenario asks for [m/s]
-    /bridgegen/stop_distance  std_msgs/Float64     to the line of a light, unless it is green [m]
-    /bridgegen/route          nav_msgs/Path        the route ahead, a pose every 2 m
-    /bridgegen/tracks         nav_msgs/Odometry    one for each track; child_frame_id is its name
-    /bridgegen/ego            nav_msgs/Odometry    rear axle's centre
-    /clock                    rosgraph_msgs/Clock
+    /tf                                  tf2_msgs/TFMessage                       map -> base_link
+    /localization/kinematic_state        nav_msgs/Odometry                        rear axle's centre
+    /localization/acceleration           geometry_msgs/AccelWithCovarianceStamped
+    /perception/object_recognition/objects  autoware_perception_msgs/PredictedObjects  the tracks
+    /planning/mission_planning/goal      geometry_msgs/PoseStamped                at the start only
+    /clock                               rosgraph_msgs/Clock
 
-Then the command of that instant is awaited: header.stamp is the clock's.
-
-    /bridgegen/command        ackermann_msgs/AckermannDriveStamped    acceleration, steering_angle
-
-The clock never goes back: the next scenario begins a second after the last one.
+Then a /planning/trajectory (autoware_planning_msgs/Trajectory) is awaited that is no older than
+LAG, and followed. Until the first one, the first instant is published again and again: the clock
+runs, the world stands. The clock never goes back: the next scenario begins a second after the last.
 """
 
+import json
 import math
+import os
+import struct
+import threading
 import time
+from types import SimpleNamespace
 
-import rclpy
-from ackermann_msgs.msg import AckermannDriveStamped
-from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseStamped
-from nav_msgs.msg import Odometry, Path
-from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Empty, Float64
+import numpy as np
 
-FRAME = "map"
-WHEEL_BASE = 2.8  # m, of the stack's vehicle: what its steering angle stands for
-START, ANSWER = 30.0, 5.0  # s, of real time: until the stack is there, and for a command
-QUEUE = 100
-RED_TO_YELLOW = (1, 2, 3)  # states of a light that has one stop
+START, ANSWER = 60.0, 5.0  # s, of real time: until the first trajectory, and each later one
+GOAL_AGAIN = 5.0  # s, of real time: a goal may come before Autoware knows where it is
+LAG = 0.3  # s, of the clock: Autoware's nodes work one after the other, at 10 Hz each
+STILL = 0.05  # m/s: slower than that, a plan stands
+STEP, STEPS = 0.5, 21  # s, of the predicted paths of objects
+HEIGHT = 1.5  # m, of an object: tracks have none
+LABELS = (1, 2, 3, 5, 6, 7, 8, 0)  # ObjectClassification's, by BridgeGen's class
+MOST_POINTS = 900  # a BridgeGen trajectory has at most 1000
+
+# --- Messages: their fields' types in the order of ROS 2's and autoware_msgs' definitions ---------
+
+SCALARS = {"uint8": "B", "int32": "i", "uint32": "I", "float32": "f", "float64": "d"}
+TYPES = {
+    "Time": "int32 uint32",  # and a Duration
+    "Header": "Time string",
+    "Vector3": "float64 float64 float64",
+    "Point32": "float32 float32 float32",
+    "Quaternion": "float64 float64 float64 float64",
+    "Pose": "Vector3 Quaternion",
+    "Twist": "Vector3 Vector3",
+    "PoseWithCovariance": "Pose float64*36",
+    "TwistWithCovariance": "Twist float64*36",
+    "TransformStamped": "Header string Vector3 Quaternion",
+    "TFMessage": "TransformStamped[]",
+    "Clock": "Time",
+    "PoseStamped": "Header Pose",
+    "Odometry": "Header string PoseWithCovariance TwistWithCovariance",
+    "AccelWithCovarianceStamped": "Header TwistWithCovariance",  # an Accel is as a Twist
+    "ObjectClassification": "uint8 float32",
+    "PredictedPath": "Pose[] Time float32",
+    "Kinematics": "PoseWithCovariance TwistWithCovariance TwistWithCovariance PredictedPath[]",
+    "Shape": "uint8 Point32[] Vector3",
+    "PredictedObject": "uint8*16 float32 ObjectClassification[] Kinematics Shape",
+    "PredictedObjects": "Header PredictedObject[]",
+    "TrajectoryPoint": "Time Pose float32 float32 float32 float32 float32 float32",
+    "Trajectory": "Header TrajectoryPoint[]",
+}
+HEAD = b"\x00\x01\x00\x00"  # plain CDR, little-endian
 
 
-class Ros2Driver:
-    max_rows = 1  # a stack drives one car
+def encode(kind, value) -> bytes:
+    """Return a message, nested tuples of its fields, as CDR."""
+    out = bytearray()
+    put(kind, value, out)
+    return HEAD + bytes(out)
+
+
+def fields(kind):
+    name, _, number = kind.partition("*")
+    return [name] * int(number) if number else TYPES[kind].split()
+
+
+def put(kind, value, out) -> None:
+    if kind in SCALARS:
+        code = SCALARS[kind]
+        out += bytes(-len(out) % struct.calcsize(code)) + struct.pack("<" + code, value)
+    elif kind == "string":
+        put("uint32", len(value.encode()) + 1, out)
+        out += value.encode() + b"\0"
+    elif kind.endswith("[]"):
+        put("uint32", len(value), out)
+        for one in value:
+            put(kind[:-2], one, out)
+    else:
+        for each, one in zip(fields(kind), value, strict=True):
+            put(each, one, out)
+
+
+def decode(kind, data):
+    """Return the message as nested tuples; ValueError if it is none of that kind."""
+    if data[:2] != HEAD[:2]:
+        raise ValueError(f"a {kind} must be plain CDR, little-endian, got {data[:4].hex()}")
+    try:
+        return get(kind, data[4:], 0)[0]
+    except (struct.error, UnicodeDecodeError) as error:
+        raise ValueError(f"{len(data)} bytes are no {kind}: {error}") from None
+
+
+def get(kind, data, at):
+    """Return what begins at a place, and the place after it."""
+    if kind in SCALARS:
+        size = struct.calcsize(SCALARS[kind])
+        at += -at % size
+        return struct.unpack_from("<" + SCALARS[kind], data, at)[0], at + size
+    if kind == "string":
+        n, at = get("uint32", data, at)
+        return bytes(data[at : at + n]).decode().rstrip("\0"), at + n
+    if kind.endswith("[]"):
+        n, at = get("uint32", data, at)
+    found = []
+    for each in [kind[:-2]] * min(n, len(data)) if kind.endswith("[]") else fields(kind):
+        one, at = get(each, data, at)
+        found.append(one)
+    return tuple(found), at
+
+
+# --- The driver -----------------------------------------------------------------------------------
+
+
+class Autoware:
+    max_rows, period, wants = 1, 0.1, ("lanes",)  # a stack drives one car
 
     def __init__(self) -> None:
-        rclpy.init()
-        self.node = node = rclpy.create_node("bridgegen")
-        self.clock = node.create_publisher(Clock, "/clock", QUEUE)
-        kinds = {
-            "reset": Empty, "target_speed": Float64, "stop_distance": Float64, "route": Path,
-            "tracks": Odometry, "ego": Odometry,
-        }  # fmt: skip
-        self.topics = {
-            name: node.create_publisher(kind, f"/bridgegen/{name}", QUEUE)
-            for name, kind in kinds.items()
-        }
-        node.create_subscription(AckermannDriveStamped, "/bridgegen/command", self.take, QUEUE)
-        self.command, self.start, self.stamp = None, 0, Time()
-        deadline = time.monotonic() + START
-        while not node.count_publishers("/bridgegen/command"):
-            if time.monotonic() > deadline:
-                raise TimeoutError(f"nobody publishes /bridgegen/command within {START:g} s")
-            rclpy.spin_once(node, timeout_sec=0.1)
+        import zenoh
 
-    def take(self, command: AckermannDriveStamped) -> None:
-        self.command = command
+        config = zenoh.Config()
+        address = os.environ.get("ZENOH_CONNECT", "tcp/127.0.0.1:7447")
+        config.insert_json5("connect/endpoints", json.dumps([address]))
+        self.session = zenoh.open(config)
+        self.arrived, self.data = threading.Condition(), b""
+        self.subscriber = self.session.declare_subscriber("planning/trajectory", self.take)
+        self.clock = self.begin = 0  # ns
+
+    def take(self, sample) -> None:
+        with self.arrived:
+            self.data = sample.payload.to_bytes()
+            self.arrived.notify()
 
     def reset(self, n, scene) -> None:
-        self.names = scene.names
-        self.start = self.nanoseconds(self.stamp) + 1_000_000_000
-        self.topics["reset"].publish(Empty())
+        self.kinds, self.begin, self.last = scene.kinds, self.clock + 10**9, None
 
-    def act(self, observation):
-        o = observation
-        nanoseconds = self.start + round(1e9 * o.time)
-        self.stamp = Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
-        self.topics["target_speed"].publish(Float64(data=float(o.target_speed[0])))
-        stop = float(o.stop_distance[0]) if o.light[0] in RED_TO_YELLOW else math.inf
-        self.topics["stop_distance"].publish(Float64(data=stop))
-        route = Path()
-        route.header.frame_id, route.header.stamp = FRAME, self.stamp
-        for x, y, h, _ in o.route[0].tolist():
-            pose = PoseStamped()
-            pose.header = route.header
-            place(pose.pose, x, y, h)
-            route.poses.append(pose)
-        self.topics["route"].publish(route)
-        for name, track in zip(self.names, o.tracks[0].tolist(), strict=True):
-            state, x, y, h, vx, vy = track[:6]
-            if state >= 2.0:  # confirmed
-                along = math.cos(h) * vx + math.sin(h) * vy
-                left = math.cos(h) * vy - math.sin(h) * vx
-                self.topics["tracks"].publish(self.odometry(name, x, y, h, along, left))
-        x, y, h, v = (float(one[0]) for one in (o.x, o.y, o.h, o.v))
-        self.topics["ego"].publish(self.odometry("ego", x, y, h, v, 0.0))
-        self.clock.publish(Clock(clock=self.stamp))
-        drive = self.awaited().drive
-        return [drive.acceleration], [math.tan(drive.steering_angle) / WHEEL_BASE]
+    def act(self, o):
+        self.clock = self.begin + round(1e9 * o.time)
+        self.tell(o)
+        if self.last is None:
+            points = self.first(o)
+        elif not (points := self.awaited(self.clock - round(1e9 * LAG), ANSWER)):
+            raise TimeoutError(f"no /planning/trajectory of the last {LAG:g} s in {ANSWER:g} s")
+        self.last = o.time, float(o.h[0])
+        return followed(points, float(o.x[0]), float(o.y[0]))
 
-    def awaited(self) -> AckermannDriveStamped:
-        """Return the command of this instant."""
-        deadline = time.monotonic() + ANSWER
-        while True:
-            rclpy.spin_once(self.node, timeout_sec=0.1)
-            if self.command is not None and self.command.header.stamp == self.stamp:
-                return self.command
-            if time.monotonic() > deadline:
-                raise TimeoutError(f"no command of this instant within {ANSWER:g} s")
+    def first(self, o):
+        """Return the first trajectory: the clock runs, the world stands."""
+        goal, tries = pose(*o.lanes.goal[0].tolist()), round(START / self.period)
+        for k in range(tries):
+            if k % round(GOAL_AGAIN / self.period) == 0:
+                self.publish("planning/mission_planning/goal", "PoseStamped", self.at("map"), goal)
+            if points := self.awaited(self.begin, self.period):
+                return points
+            self.begin = self.clock = self.clock + round(1e9 * self.period)
+            self.tell(o)
+        raise TimeoutError(f"no /planning/trajectory within {START:g} s")
 
-    def odometry(self, name: str, x: float, y: float, h: float, v: float, left: float) -> Odometry:
-        found = Odometry()
-        found.header.frame_id, found.header.stamp, found.child_frame_id = FRAME, self.stamp, name
-        place(found.pose.pose, x, y, h)
-        found.twist.twist.linear.x, found.twist.twist.linear.y = v, left
-        return found
+    def awaited(self, oldest, seconds):
+        """Return the points of a trajectory whose stamp is that at least [ns]; None if none is."""
+        until = time.monotonic() + seconds
+        with self.arrived:
+            while True:
+                if self.data:
+                    (stamp, _), points = decode("Trajectory", self.data)
+                    if stamp[0] * 10**9 + stamp[1] >= oldest and points:
+                        return points
+                    self.data = b""
+                if not self.arrived.wait(until - time.monotonic()):
+                    return None
 
-    @staticmethod
-    def nanoseconds(stamp: Time) -> int:
-        return stamp.sec * 10**9 + stamp.nanosec
+    def tell(self, o) -> None:
+        """Publish an instant, its clock last."""
+        x, y, h, v, a = (float(one[0]) for one in (o.x, o.y, o.h, o.v, o.a))
+        place, turn = pose(x, y, h)
+        rate = 0.0
+        if self.last:
+            rate = math.remainder(h - self.last[1], math.tau) / (o.time - self.last[0])
+        self.publish("tf", "TFMessage", [(self.at("map"), "base_link", place, turn)])
+        motion = (((v, 0.0, 0.0), (0.0, 0.0, rate)), ZEROS)
+        state = (self.at("map"), "base_link", ((place, turn), ZEROS), motion)
+        self.publish("localization/kinematic_state", "Odometry", *state)
+        accel = self.at("base_link"), (((a, 0.0, 0.0), NONE), ZEROS)
+        self.publish("localization/acceleration", "AccelWithCovarianceStamped", *accel)
+        known = [(k, track) for k, track in enumerate(o.tracks[0].tolist()) if track[0] >= 2.0]
+        objects = self.at("map"), [tracked(k, track) for k, track in known]
+        self.publish("perception/object_recognition/objects", "PredictedObjects", *objects)
+        self.publish("clock", "Clock", divmod(self.clock, 10**9))
+
+    def at(self, frame):
+        """Return a header."""
+        return divmod(self.clock, 10**9), frame
+
+    def publish(self, key, kind, *fields) -> None:
+        self.session.put(key, encode(kind, fields))
 
 
-def place(pose, x: float, y: float, h: float) -> None:
-    pose.position.x, pose.position.y = x, y
-    pose.orientation.z, pose.orientation.w = math.sin(h / 2.0), math.cos(h / 2.0)
+NONE, ZEROS = (0.0,) * 3, (0.0,) * 36
+
+
+def pose(x, y, h):
+    return (x, y, 0.0), (0.0, 0.0, math.sin(h / 2.0), math.cos(h / 2.0))
+
+
+def tracked(number, track):
+    """Return a track as a PredictedObject that goes straight on as it does now."""
+    _, x, y, h, vx, vy, length, width, kind, confidence = track[:10]
+    along, left = math.cos(h) * vx + math.sin(h) * vy, math.cos(h) * vy - math.sin(h) * vx
+    path = [pose(x + vx * t, y + vy * t, h) for t in (STEP * k for k in range(STEPS))]
+    paths = [(path, (0, round(1e9 * STEP)), 1.0)]
+    motion = (path[0], ZEROS), (((along, left, 0.0), NONE), ZEROS), ((NONE, NONE), ZEROS), paths
+    label, box = (LABELS[int(kind)], confidence), (0, [], (length, width, HEIGHT))
+    return number.to_bytes(16, "big"), confidence, [label], motion, box
+
+
+def followed(points, x, y):
+    """Return Autoware's points from the place beside the ego on as a trajectory of BridgeGen's.
+
+    Their times are computed of the speeds: Autoware need not fill time_from_start.
+    """
+    path = np.array([(x, y, yaw(*turn), v) for _, ((x, y, _), turn), v, *_ in points])
+    if path[:, 3].min() < 0.0:
+        raise ValueError(f"a trajectory must go forward, got {path[:, 3].min():g} m/s")
+    path[:, 2] = np.unwrap(path[:, 2])
+    path = path[np.append(True, np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-3)]
+    if len(path) < 2:
+        raise ValueError(f"a trajectory must have two places, got {len(points)} points at one")
+    step = np.diff(path, axis=0)
+    ahead = ((x, y) - path[:-1, :2]) * step[:, :2]
+    share = ahead.sum(axis=1) / (step[:, :2] ** 2).sum(axis=1)
+    beside = path[:-1] + np.clip(share, 0.0, 1.0)[:, None] * step
+    i = int(np.argmin(np.hypot(beside[:, 0] - x, beside[:, 1] - y)))
+    path = np.vstack([beside[i], path[i + 1 : i + MOST_POINTS]])
+    far = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    path, far = path[np.append(True, far > 1e-3)], far[far > 1e-3]
+    mean = 0.5 * (path[:-1, 3] + path[1:, 3])
+    still = np.flatnonzero(mean < STILL)
+    n = int(still[0]) if len(still) else len(mean)
+    seconds = np.cumsum(np.concatenate([[0.0], far[:n] / mean[:n], [10.0]]))  # and there it stands
+    found = np.vstack([path[: n + 1], path[n] * (1.0, 1.0, 1.0, 0.0)])
+    return SimpleNamespace(time=seconds, **dict(zip("xyhv", found.T[:, None], strict=True)))
+
+
+def yaw(x, y, z, w):
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
