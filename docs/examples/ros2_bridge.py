@@ -2,22 +2,22 @@
 
 zenoh-bridge-ros2dds                # beside Autoware; it listens on port 7447
 pip install eclipse-zenoh           # here
-bridgegen search my.yaml --ego "exec:python server.py ros2_bridge.py:Autoware"
+bridgegen search my.yaml --time-limit 90 --ego "exec:python server.py ros2_bridge.py:Autoware"
 
 server.py and messages.py are drivers/remote's, copied beside this file where BridgeGen is not
-installed for this Python (3.10). ZENOH_CONNECT is the bridge's address, tcp/127.0.0.1:7447 if it
-is not set. Published at each instant, every 0.1 s, before /clock:
+installed for this Python (3.10 or later). ZENOH_CONNECT is the address of zenoh-bridge-ros2dds if
+it is not tcp/127.0.0.1:7447. Published at each instant, every 0.1 s:
 
-    /tf                                  tf2_msgs/TFMessage                       map -> base_link
-    /localization/kinematic_state        nav_msgs/Odometry                        rear axle's centre
-    /localization/acceleration           geometry_msgs/AccelWithCovarianceStamped
-    /perception/object_recognition/objects  autoware_perception_msgs/PredictedObjects  the tracks
-    /planning/mission_planning/goal      geometry_msgs/PoseStamped                at the start only
-    /clock                               rosgraph_msgs/Clock
+    /tf                                     tf2_msgs/TFMessage, map -> base_link (the rear axle)
+    /localization/kinematic_state           nav_msgs/Odometry
+    /localization/acceleration              geometry_msgs/AccelWithCovarianceStamped
+    /perception/object_recognition/objects  autoware_perception_msgs/PredictedObjects
+    /clock                                  rosgraph_msgs/Clock
+    /planning/mission_planning/goal         geometry_msgs/PoseStamped, at the start only
 
-Then a /planning/trajectory (autoware_planning_msgs/Trajectory) is awaited that is no older than
-LAG, and followed. Until the first one, the first instant is published again and again: the clock
-runs, the world stands. The clock never goes back: the next scenario begins a second after the last.
+Then a new /planning/trajectory (autoware_planning_msgs/Trajectory) is awaited, and followed. Until
+the first one comes the first instant is repeated: the clock runs, the world stands. The clock never
+goes back: the next scenario begins a second after the last one.
 """
 
 import json
@@ -31,13 +31,13 @@ from types import SimpleNamespace
 import numpy as np
 
 START, ANSWER = 60.0, 5.0  # s, of real time: until the first trajectory, and each later one
-GOAL_AGAIN = 5.0  # s, of real time: a goal may come before Autoware knows where it is
-LAG = 0.3  # s, of the clock: Autoware's nodes work one after the other, at 10 Hz each
+LAG = 300_000_000  # ns that a trajectory's stamp may be behind the clock: nodes work in turn
 STILL = 0.05  # m/s: slower than that, a plan stands
 STEP, STEPS = 0.5, 21  # s, of the predicted paths of objects
 HEIGHT = 1.5  # m, of an object: tracks have none
 LABELS = (1, 2, 3, 5, 6, 7, 8, 0)  # ObjectClassification's, by BridgeGen's class
-MOST_POINTS = 900  # a BridgeGen trajectory has at most 1000
+MOST_POINTS = 900  # BridgeGen takes 1000
+NONE, ZEROS = (0.0,) * 3, (0.0,) * 36
 
 # --- Messages: their fields' types in the order of ROS 2's and autoware_msgs' definitions ---------
 
@@ -49,15 +49,14 @@ TYPES = {
     "Point32": "float32 float32 float32",
     "Quaternion": "float64 float64 float64 float64",
     "Pose": "Vector3 Quaternion",
-    "Twist": "Vector3 Vector3",
     "PoseWithCovariance": "Pose float64*36",
-    "TwistWithCovariance": "Twist float64*36",
+    "TwistWithCovariance": "Vector3 Vector3 float64*36",  # and an AccelWithCovariance
     "TransformStamped": "Header string Vector3 Quaternion",
     "TFMessage": "TransformStamped[]",
     "Clock": "Time",
     "PoseStamped": "Header Pose",
     "Odometry": "Header string PoseWithCovariance TwistWithCovariance",
-    "AccelWithCovarianceStamped": "Header TwistWithCovariance",  # an Accel is as a Twist
+    "AccelWithCovarianceStamped": "Header TwistWithCovariance",
     "ObjectClassification": "uint8 float32",
     "PredictedPath": "Pose[] Time float32",
     "Kinematics": "PoseWithCovariance TwistWithCovariance TwistWithCovariance PredictedPath[]",
@@ -67,7 +66,7 @@ TYPES = {
     "TrajectoryPoint": "Time Pose float32 float32 float32 float32 float32 float32",
     "Trajectory": "Header TrajectoryPoint[]",
 }
-HEAD = b"\x00\x01\x00\x00"  # plain CDR, little-endian
+HEAD = b"\0\1\0\0"  # plain CDR, little-endian
 
 
 def encode(kind, value) -> bytes:
@@ -126,18 +125,15 @@ def get(kind, data, at):
     return tuple(found), at
 
 
-# --- The driver -----------------------------------------------------------------------------------
-
-
 class Autoware:
     max_rows, period, wants = 1, 0.1, ("lanes",)  # a stack drives one car
 
     def __init__(self) -> None:
         import zenoh
 
-        config = zenoh.Config()
-        address = os.environ.get("ZENOH_CONNECT", "tcp/127.0.0.1:7447")
-        config.insert_json5("connect/endpoints", json.dumps([address]))
+        config, default = zenoh.Config(), "tcp/127.0.0.1:7447"
+        address = json.dumps([os.environ.get("ZENOH_CONNECT", default)])
+        config.insert_json5("connect/endpoints", address)
         self.session = zenoh.open(config)
         self.arrived, self.data = threading.Condition(), b""
         self.subscriber = self.session.declare_subscriber("planning/trajectory", self.take)
@@ -149,55 +145,53 @@ class Autoware:
             self.arrived.notify()
 
     def reset(self, n, scene) -> None:
-        self.kinds, self.begin, self.last = scene.kinds, self.clock + 10**9, None
+        self.begin, self.last = self.clock + 10**9, None
 
     def act(self, o):
         self.clock = self.begin + round(1e9 * o.time)
         self.tell(o)
-        if self.last is None:
-            points = self.first(o)
-        elif not (points := self.awaited(self.clock - round(1e9 * LAG), ANSWER)):
-            raise TimeoutError(f"no /planning/trajectory of the last {LAG:g} s in {ANSWER:g} s")
+        points = self.awaited(ANSWER) if self.last else self.first(o)
+        if not points:
+            limit = ANSWER if self.last else START
+            raise TimeoutError(f"no new /planning/trajectory within {limit:g} s")
         self.last = o.time, float(o.h[0])
         return followed(points, float(o.x[0]), float(o.y[0]))
 
     def first(self, o):
-        """Return the first trajectory: the clock runs, the world stands."""
-        goal, tries = pose(*o.lanes.goal[0].tolist()), round(START / self.period)
-        for k in range(tries):
-            if k % round(GOAL_AGAIN / self.period) == 0:
+        """Return the points of the first trajectory: the clock runs, the world stands."""
+        goal, points = pose(*o.lanes.goal[0].tolist()), None
+        for k in range(round(START / self.period)):
+            if k % 50 == 0:  # again: it may have come before Autoware knew where it is
                 self.publish("planning/mission_planning/goal", "PoseStamped", self.at("map"), goal)
-            if points := self.awaited(self.begin, self.period):
-                return points
+            if points := self.awaited(self.period):
+                break
             self.begin = self.clock = self.clock + round(1e9 * self.period)
             self.tell(o)
-        raise TimeoutError(f"no /planning/trajectory within {START:g} s")
+        return points
 
-    def awaited(self, oldest, seconds):
-        """Return the points of a trajectory whose stamp is that at least [ns]; None if none is."""
+    def awaited(self, seconds):
+        """Return the points of a trajectory that comes after this instant; None if none does."""
         until = time.monotonic() + seconds
         with self.arrived:
-            while True:
-                if self.data:
-                    (stamp, _), points = decode("Trajectory", self.data)
-                    if stamp[0] * 10**9 + stamp[1] >= oldest and points:
-                        return points
-                    self.data = b""
-                if not self.arrived.wait(until - time.monotonic()):
-                    return None
+            while self.data or self.arrived.wait(until - time.monotonic()):
+                (stamp, _), points = decode("Trajectory", self.data)
+                if stamp[0] * 10**9 + stamp[1] >= self.clock - LAG and points:
+                    return points
+                self.data = b""
+        return None
 
     def tell(self, o) -> None:
         """Publish an instant, its clock last."""
+        self.data = b""
         x, y, h, v, a = (float(one[0]) for one in (o.x, o.y, o.h, o.v, o.a))
         place, turn = pose(x, y, h)
-        rate = 0.0
-        if self.last:
-            rate = math.remainder(h - self.last[1], math.tau) / (o.time - self.last[0])
+        since, before = self.last or (-math.inf, h)
+        rate = math.remainder(h - before, math.tau) / (o.time - since)
         self.publish("tf", "TFMessage", [(self.at("map"), "base_link", place, turn)])
-        motion = (((v, 0.0, 0.0), (0.0, 0.0, rate)), ZEROS)
+        motion = (v, 0.0, 0.0), (0.0, 0.0, rate), ZEROS
         state = (self.at("map"), "base_link", ((place, turn), ZEROS), motion)
         self.publish("localization/kinematic_state", "Odometry", *state)
-        accel = self.at("base_link"), (((a, 0.0, 0.0), NONE), ZEROS)
+        accel = self.at("base_link"), ((a, 0.0, 0.0), NONE, ZEROS)
         self.publish("localization/acceleration", "AccelWithCovarianceStamped", *accel)
         known = [(k, track) for k, track in enumerate(o.tracks[0].tolist()) if track[0] >= 2.0]
         objects = self.at("map"), [tracked(k, track) for k, track in known]
@@ -205,14 +199,10 @@ class Autoware:
         self.publish("clock", "Clock", divmod(self.clock, 10**9))
 
     def at(self, frame):
-        """Return a header."""
         return divmod(self.clock, 10**9), frame
 
     def publish(self, key, kind, *fields) -> None:
         self.session.put(key, encode(kind, fields))
-
-
-NONE, ZEROS = (0.0,) * 3, (0.0,) * 36
 
 
 def pose(x, y, h):
@@ -225,20 +215,17 @@ def tracked(number, track):
     along, left = math.cos(h) * vx + math.sin(h) * vy, math.cos(h) * vy - math.sin(h) * vx
     path = [pose(x + vx * t, y + vy * t, h) for t in (STEP * k for k in range(STEPS))]
     paths = [(path, (0, round(1e9 * STEP)), 1.0)]
-    motion = (path[0], ZEROS), (((along, left, 0.0), NONE), ZEROS), ((NONE, NONE), ZEROS), paths
+    motion = (path[0], ZEROS), ((along, left, 0.0), NONE, ZEROS), (NONE, NONE, ZEROS), paths
     label, box = (LABELS[int(kind)], confidence), (0, [], (length, width, HEIGHT))
     return number.to_bytes(16, "big"), confidence, [label], motion, box
 
 
 def followed(points, x, y):
-    """Return Autoware's points from the place beside the ego on as a trajectory of BridgeGen's.
-
-    Their times are computed of the speeds: Autoware need not fill time_from_start.
-    """
+    """Return the plan from the place beside the ego on; time_from_start need not be filled."""
     path = np.array([(x, y, yaw(*turn), v) for _, ((x, y, _), turn), v, *_ in points])
+    path[:, 2] = np.unwrap(path[:, 2])
     if path[:, 3].min() < 0.0:
         raise ValueError(f"a trajectory must go forward, got {path[:, 3].min():g} m/s")
-    path[:, 2] = np.unwrap(path[:, 2])
     path = path[np.append(True, np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-3)]
     if len(path) < 2:
         raise ValueError(f"a trajectory must have two places, got {len(points)} points at one")
@@ -251,8 +238,7 @@ def followed(points, x, y):
     far = np.hypot(*np.diff(path[:, :2], axis=0).T)
     path, far = path[np.append(True, far > 1e-3)], far[far > 1e-3]
     mean = 0.5 * (path[:-1, 3] + path[1:, 3])
-    still = np.flatnonzero(mean < STILL)
-    n = int(still[0]) if len(still) else len(mean)
+    n = int(np.argmax(np.append(mean < STILL, True)))
     seconds = np.cumsum(np.concatenate([[0.0], far[:n] / mean[:n], [10.0]]))  # and there it stands
     found = np.vstack([path[: n + 1], path[n] * (1.0, 1.0, 1.0, 0.0)])
     return SimpleNamespace(time=seconds, **dict(zip("xyhv", found.T[:, None], strict=True)))
