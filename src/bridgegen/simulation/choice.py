@@ -1,5 +1,6 @@
 """Which simulator runs a scenario, and how; what is asked for on the command line."""
 
+import os
 from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,10 @@ if TYPE_CHECKING:  # it is part of the command line, which starts fast
 
 Value = bool | int | float | str
 """Value of a simulator's setting."""
+
+DEVICE = "BRIDGEGEN_DEVICE"
+"""Variable of the environment with the device on which the embedded simulator runs: "cuda"; so that
+processes which this one starts use it, too."""
 
 
 @dataclass(frozen=True)
@@ -194,6 +199,8 @@ class SimulatorChoice:
                 simulator.
         """
         driver = embedded.program.driver
+        if device := os.environ.get(DEVICE):
+            _require_compiled(embedded, self.name, f"--device {device}")
         if driver.home not in ("", self.name):
             raise InputError(
                 f"{embedded.program.place}: the driver '{driver.name}' drives in the simulator "
@@ -216,6 +223,23 @@ class SimulatorChoice:
                 f"{' and '.join(_OURS)} run, got {self.name}"
             )
         return SIMULATORS[self.name].make(embedded, storyboard, self.settings, self.access)
+
+
+def _require_compiled(embedded: "EmbeddedSimulator", simulator: str, asker: str) -> None:
+    """Check that a storyboard runs on a device.
+
+    Raises:
+        InputError: it does not.
+    """
+    driver, place = embedded.program.driver, embedded.program.place
+    if simulator != EMBEDDED.name:
+        raise InputError(f"{place}: {asker} runs the embedded simulator, got {simulator}")
+    if driver.is_own or driver.home:
+        raise InputError(
+            f"{place}: {asker} runs drivers that ship, which are compiled, got '{driver.name}'"
+        )
+    if embedded.partners:
+        raise InputError(f"{place}: {asker} runs one ego, and the scenario has several")
 
 
 EMBEDDED = SimulatorChoice()
