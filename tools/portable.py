@@ -41,7 +41,7 @@ from bridgegen.base.compiled import compile_for_kernels, row_type
 from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.pages.simulation_payload import facts_of, measuring_of, verdict_of
+from bridgegen.assess.conflict.judging import facts_of, measuring_of, verdict_of
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded import portable
 from bridgegen.simulation.embedded._rollout_kernels import simulate_row
@@ -224,7 +224,7 @@ def kinds() -> Kinds:
     pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="reference"))
     batch = pipeline.runner.nominal_batch()
     rows = batch.kinds()
-    rollout = batch.run()
+    rollout = batch.standing()
     facts = facts_of(rollout, 0, np.zeros((0, CORRIDOR)))
     bundles = (facts, measuring_of(rollout, 0), verdict_of(*rollout.shape[1:]))
     return Kinds(*rows, *(row_type(bundle, 0) for bundle in bundles))

@@ -17,6 +17,7 @@ from bridgegen.base.compilation.library import KernelLibrary
 from bridgegen.base.compiled import Bundle, _BundleModel, row_type
 from bridgegen.engine import _device_kernels as kernels
 from bridgegen.simulation.embedded import device as shipped
+from bridgegen.simulation.embedded import portable
 from bridgegen.simulation.embedded.addresses import CALLED
 from bridgegen.simulation.embedded.drivers import ask
 
@@ -334,12 +335,12 @@ def with_entry(text: str, run: str, called: dict[int, str], tables: dict[str, in
 
 def _switched(text: str, called: dict[int, str]) -> tuple[str, str]:
     """Return a module that calls kernels by their number, and the functions that do so."""
-    types_of = {
-        symbol: re.sub(r" (noalias|nonnull|captures\(none\)|%\S+|readnone|nocapture|readonly|writeonly|\w+\([^)]*\))(?=[ ,)]|$)", "", found.group(1))
+    # The first word of each parameter; attributes may follow, and have parentheses.
+    kinds_of = {
+        symbol: ", ".join(re.findall(r"(?:^|, )(\w+) ", found.group(1)))
         for symbol in called.values()
-        if (found := re.search(rf'^define [^\n]*@"?{re.escape(symbol)}"?\((.*?)\)(?: |$)', text, re.MULTILINE))
+        if (found := re.search(rf"^define [^\n]*@{symbol}\(([^\n]*)\) .*{{$", text, re.MULTILINE))
     }
-    kinds_of = {s: ", ".join(part.split()[0] for part in t.split(",")) for s, t in types_of.items()}
     made: dict[str, str] = {}
 
     def replaced(found: re.Match[str]) -> str:
@@ -354,7 +355,9 @@ def _switched(text: str, called: dict[int, str]) -> tuple[str, str]:
     for kinds_here, name in made.items():
         each = kinds_here.split(", ")
         params = ", ".join(f"{kind} %a{i}" for i, kind in enumerate(each))
-        fitting = {code: symbol for code, symbol in called.items() if kinds_of[symbol] == kinds_here}
+        fitting = {
+            code: symbol for code, symbol in called.items() if kinds_of[symbol] == kinds_here
+        }
         assert fitting, kinds_here
         cases = " ".join(f"i64 {code}, label %c{code}" for code in fitting)
         blocks = "\n".join(
@@ -383,7 +386,7 @@ def finish(text: str) -> None:
     text = f'target datalayout = "{machine.target_data}"\n{text}'
     exports = {"rows", "job", *re.findall(r"^@(table_\w+) =", text, re.MULTILINE)}
     module = optimised(text, machine, TRIPLE, exports)
-    ptx = machine.emit_assembly(module)
+    ptx = f"// bridgegen {portable.device_sources()}\n{machine.emit_assembly(module)}"
     packed = gzip.compress(ptx.encode(), 9, mtime=0)
     shipped.PATH.write_bytes(packed)
     open("/tmp/gpu.ptx", "w").write(ptx)

@@ -6,12 +6,16 @@ Source: CUDA Driver API, https://docs.nvidia.com/cuda/cuda-driver-api/.
 import ctypes
 import sys
 from ctypes import byref, c_char_p, c_int, c_size_t, c_uint, c_void_p
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any
 
 from bridgegen.base.errors import InputError, WorkersError
+
+if TYPE_CHECKING:  # it is part of the command line, which starts fast
+    import numpy.typing as npt
+
+DEVICE = "BRIDGEGEN_DEVICE"
+"""Variable of the environment with the device on which the embedded simulator runs: "cuda"; so that
+processes which this one starts use it, too."""
 
 LOG = 8192
 """Number of characters of the compiler's log that are kept."""
@@ -112,13 +116,17 @@ class Gpu:
         """Free what ``take`` returned."""
         self._call("cuMemFree_v2", c_void_p(at))
 
-    def put(self, at: int, array: npt.NDArray[Any]) -> None:
+    def put(self, at: int, array: "npt.NDArray[Any]") -> None:
         """Copy the bytes of a contiguous array to the device."""
-        self._call("cuMemcpyHtoD_v2", c_void_p(at), c_void_p(array.ctypes.data), c_size_t(array.nbytes))
+        self._call(
+            "cuMemcpyHtoD_v2", c_void_p(at), c_void_p(array.ctypes.data), c_size_t(array.nbytes)
+        )
 
-    def get(self, array: npt.NDArray[Any], at: int) -> None:
+    def get(self, array: "npt.NDArray[Any]", at: int) -> None:
         """Fill a contiguous array with the bytes of the device."""
-        self._call("cuMemcpyDtoH_v2", c_void_p(array.ctypes.data), c_void_p(at), c_size_t(array.nbytes))
+        self._call(
+            "cuMemcpyDtoH_v2", c_void_p(array.ctypes.data), c_void_p(at), c_size_t(array.nbytes)
+        )
 
     def clear(self, at: int, size: int) -> None:
         """Set bytes to 0."""
@@ -154,13 +162,3 @@ class Gpu:
         log = getattr(self, "_log", None)
         words = " ".join(log.value.decode(errors="replace").split())[:400] if log else ""
         raise InputError(f"--device cuda: {name} in {function}" + (f": {words}" if words else ""))
-
-
-def words_of(values: Any) -> npt.NDArray[np.int64]:
-    """Return whole numbers, and floating-point numbers by their bits, as words of 64 bits."""
-    found = np.zeros(len(values), np.int64)
-    for i, value in enumerate(values):
-        found[i : i + 1] = np.array([value], np.float64).view(np.int64) if isinstance(
-            value, float
-        ) else value
-    return found

@@ -11,10 +11,11 @@ from typing import Annotated, Any
 
 import typer
 
+from bridgegen.base.cuda import DEVICE
 from bridgegen.base.errors import InputError
 from bridgegen.cli.declared import expand, with_parameters
 from bridgegen.engine.options.option import SEARCH, SIMULATOR
-from bridgegen.simulation.choice import DEVICE, SIMULATORS, SimulatorChoice, Value
+from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
 
 Connection = Mapping[str, Value]
 """A connection to a simulator: values by the spelling of their options."""

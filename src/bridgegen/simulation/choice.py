@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from bridgegen.base.cuda import DEVICE
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.base.plugins import PlugIns, Registry
 from bridgegen.simulation.vehicles import KINEMATIC
@@ -17,10 +18,6 @@ if TYPE_CHECKING:  # it is part of the command line, which starts fast
 
 Value = bool | int | float | str
 """Value of a simulator's setting."""
-
-DEVICE = "BRIDGEGEN_DEVICE"
-"""Variable of the environment with the device on which the embedded simulator runs: "cuda"; so that
-processes which this one starts use it, too."""
 
 
 @dataclass(frozen=True)

@@ -145,6 +145,11 @@ class Conflicts:
         vehicle = np.where(np.isin(body, self.driven), body, 0)
         return vehicle, np.where(other == 0, vehicle, np.where(other == vehicle, 0, other))
 
+    def take(self, at: Int) -> "Conflicts":
+        """Return those of some rows."""
+        arrays = {item.name: getattr(self, item.name) for item in fields(self)}
+        return replace(self, **{n: a[at] for n, a in arrays.items() if isinstance(a, np.ndarray)})
+
     @cached_property
     def at_fault(self) -> Bool:
         """``(N, E)``: the ego has failed.

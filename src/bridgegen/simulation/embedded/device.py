@@ -7,7 +7,7 @@ threads read at once should lie in one piece; threads use theirs again for furth
 
 import gzip
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -17,12 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.base.arrays import Float, Int
-from bridgegen.base.cuda import Gpu, OutOfMemory
+from bridgegen.base.cuda import DEVICE, Gpu, OutOfMemory
 from bridgegen.base.errors import InputError, WorkersError
 from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
-from bridgegen.simulation.choice import DEVICE
+from bridgegen.simulation.embedded.addresses import CALLED, addressed
+from bridgegen.simulation.embedded.batch import noise_keys, put_back, starts_of, taken
+from bridgegen.simulation.embedded.drivers import DEMANDS
+from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
 
 PATH = Path(__file__).with_name("kernels.ptx.gz")
@@ -105,6 +108,15 @@ def given_of(states: memory.State) -> Given:
     return Given(states.slots, states.station, states.aside, states.key)
 
 
+def own_of(
+    program: Program, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike]
+) -> Given:
+    """Return what N rows have of their own; see `Batch`, which makes all of their states."""
+    slots = program.fill(values, len(rows))
+    station, aside = starts_of(program, roads, rows, slots)
+    return Given(slots, station, aside, noise_keys(program, values, len(rows))[:, np.newaxis])
+
+
 def found_of(n: int, e: int = 0, metrics: int = 0, whole: int = 0, real: int = 0) -> Found:
     """Return arrays of N rows, zeros.
 
@@ -128,6 +140,11 @@ def found_of(n: int, e: int = 0, metrics: int = 0, whole: int = 0, real: int = 0
     )
 
 
+def some_of(rows: Any, at: Int | slice) -> Any:
+    """Return some rows of a named tuple of arrays."""
+    return type(rows)(*(array[at] for array in rows))
+
+
 # --- Where arrays lie ---
 
 
@@ -143,7 +160,11 @@ def table_of(bundle: NamedTuple, axes: int, lanes: int = 1) -> tuple[Int, int]:
     at = 0
     for value in bundle:
         if not isinstance(value, np.ndarray):
-            words.append(int(np.array([value], np.float64).view(np.int64)[0]) if isinstance(value, float) else int(value))
+            words.append(
+                int(np.array([value], np.float64).view(np.int64)[0])
+                if isinstance(value, float)
+                else int(value)
+            )
             continue
         shape = value.shape[axes:]
         step = value.itemsize if lanes == 1 else 8 * lanes
@@ -162,13 +183,15 @@ def packed(bundle: NamedTuple, axes: int) -> npt.NDArray[np.uint8]:
     return np.concatenate([np.pad(part, ((0, 0), (0, -part.shape[1] % 8))) for part in parts], 1)
 
 
-def unpack(block: npt.NDArray[np.uint8], bundle: NamedTuple) -> None:
-    """Fill arrays of N rows with the bytes ``(N, size)`` of those of a bundle."""
+def unpack(block: npt.NDArray[np.uint8], bundle: NamedTuple, rows: Int | slice) -> None:
+    """Fill some rows of arrays with the bytes ``(N, size)`` of those of a bundle."""
     at = 0
     for value in bundle:
         size = value[0].nbytes
-        found = np.ndarray(value.shape, value.dtype, block, at, (block.shape[1], *value.strides[1:]))
-        value[...] = found
+        found = np.ndarray(
+            value.shape, value.dtype, block, at, (block.shape[1], *value.strides[1:])
+        )
+        value[rows] = found[rows]
         at += -(-size // 8) * 8
 
 
@@ -212,8 +235,13 @@ class Device:
         self._rooms: dict[str, tuple[int, int]] = {}
 
     def simulate_rows(
-        self, program: Program, plan: memory.Plan, roads: memory.Roads, rows: Int,
-        states: memory.State, records: memory.Record,
+        self,
+        program: Program,
+        plan: memory.Plan,
+        roads: memory.Roads,
+        rows: Int,
+        states: memory.State,
+        records: memory.Record,
     ) -> None:
         """Roll N rows out as ``_rollout_kernels.simulate_rows`` does, with the same bits.
 
@@ -227,20 +255,26 @@ class Device:
             states: likewise.
             records: likewise.
         """
-        given, coded = given_of(states), coded_plan(plan, program)
+        given, table = given_of(states), coded(plan, program)
         template = template_of(states)
         size = table_of(records, 1)[1]
         for start, stop in self._parts(len(rows), size):
             at = slice(start, stop)
-            some = memory.Record(*(array[at] for array in records))
-            own = Given(*(array[at] for array in given))
-            found = self.run(coded, roads, rows[at], own, states, template, some, None)
-            lost = start + np.flatnonzero(found.done[:, 0] == 0)
-            states.ending[at], states.wanted[at] = found.ending, found.wanted
-            states.transitions[at], states.on[at, 0] = found.transitions, found.on[:, 0]
-            states.travelled[at, 0], states.station[at, 0] = found.way[:, 0], found.way[:, 1]
-            states.weather[at, FRICTION] = found.way[:, 2]
-            del lost
+            some = some_of(records, at)
+            own = some_of(given, at)
+            found = self.run(table, roads, rows[at], own, states, template, some, None)
+            (there,) = np.nonzero(found.done[:, 0])
+            done, lost = start + there, start + np.flatnonzero(found.done[:, 0] == 0)
+            states.ending[done], states.wanted[done] = found.ending[there], found.wanted[there]
+            states.transitions[done] = found.transitions[there]
+            states.on[done, 0], way = found.on[there, 0], found.way[there]
+            states.travelled[done, 0], states.station[done, 0] = way[:, 0], way[:, 1]
+            states.weather[done, FRICTION] = way[:, 2]
+            if lost.size:  # this processor has more memory for a row
+                state, record = taken(states, lost), taken(records, lost)
+                kernels.simulate_rows(plan, roads, rows[lost], state, record)
+                put_back(states, state, lost)
+                put_back(records, record, lost)
 
     def _parts(self, n: int, size: int) -> Sequence[tuple[int, int]]:
         """Return the bounds of parts of N rows whose records fit into half of the memory."""
@@ -250,8 +284,14 @@ class Device:
         return [(at, min(at + most, n)) for at in range(0, n, most)]
 
     def run(
-        self, plan: memory.Plan, roads: memory.Roads, networks: Int, given: Given,
-        states: memory.State, template: npt.NDArray[np.uint64], records: memory.Record,
+        self,
+        plan: memory.Plan,
+        roads: memory.Roads,
+        networks: Int,
+        given: Given,
+        states: memory.State,
+        template: npt.NDArray[np.uint64],
+        records: memory.Record,
         judging: Judging | None,
     ) -> Found:
         """Run N rows; fill their records, unless they are judged.
@@ -271,11 +311,19 @@ class Device:
             try:
                 return self._run(plan, roads, networks, given, states, template, records, judging)
             except OutOfMemory as error:
-                raise WorkersError(f"the GPU ({self._gpu.name}) has too little memory ({error})") from None
+                raise WorkersError(
+                    f"the GPU ({self._gpu.name}) has too little memory ({error})"
+                ) from None
 
     def _run(
-        self, plan: memory.Plan, roads: memory.Roads, networks: Int, given: Given,
-        states: memory.State, template: npt.NDArray[np.uint64], records: memory.Record,
+        self,
+        plan: memory.Plan,
+        roads: memory.Roads,
+        networks: Int,
+        given: Given,
+        states: memory.State,
+        template: npt.NDArray[np.uint64],
+        records: memory.Record,
         judging: Judging | None,
     ) -> Found:
         n = len(networks)
@@ -302,10 +350,13 @@ class Device:
         each = sizes["state"] // LANES + heap
         if judging:
             each += (sizes["record"] + sizes["verdict"]) // LANES
-        content = {"plan": packed(plan, 0), "roads": packed(roads, 1), "given": packed(given, 1)}
+        content: dict[str, npt.NDArray[Any]] = {"plan": packed(plan, 0), "roads": packed(roads, 1), "given": packed(given, 1)}
         content |= {"TEMPLATE": template, "networks": np.ascontiguousarray(networks)}
         if judging:
-            content |= {"facts": packed(judging.facts, 1), "measuring": packed(judging.measuring, 1)}
+            content |= {
+                "facts": packed(judging.facts, 1),
+                "measuring": packed(judging.measuring, 1),
+            }
         job = dict.fromkeys(JOB, 0)
         job |= {name: self._put(name, array) for name, array in content.items()}
         job["found"] = self._room("found", n * sizes["found"])
@@ -326,11 +377,12 @@ class Device:
         self._gpu.launch(self._entry, blocks, THREADS)
         block = np.empty((n, sizes["found"]), np.uint8)
         self._gpu.get(block, job["found"])
-        unpack(block, found)
+        unpack(block, found, slice(None))
         if keeps:
             block = np.empty((n, sizes["record"]), np.uint8)
             self._gpu.get(block, job["record"])
-            unpack(block, records)
+            done = found.done[:, 0] == 1
+            unpack(block, records, slice(None) if done.all() else np.flatnonzero(done))
         return found
 
     def _blocks(self, n: int, each: int) -> int:
@@ -378,11 +430,8 @@ def current() -> Device:
     return _opened()
 
 
-def coded_plan(plan: memory.Plan, program: Program) -> memory.Plan:
-    """Return a plan with the numbers of the kernels that it needs, in place of addresses."""
-    from bridgegen.simulation.embedded.addresses import CALLED, addressed
-    from bridgegen.simulation.embedded.drivers import DEMANDS
-
+def coded(plan: memory.Plan, program: Program) -> memory.Plan:
+    """Return a plan with the numbers of kernels in ``CALLED``, from 1 on, in place of addresses."""
     order = list(CALLED)
     drives = DEMANDS.get(program.driver.kernel)
     return addressed(plan, drives, lambda kernel: 1 + order.index(kernel))

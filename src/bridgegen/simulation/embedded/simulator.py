@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.base.arrays import Float, Int
+from bridgegen.base.cuda import DEVICE
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import Driver
 from bridgegen.drivers._weather_columns import WEATHER
@@ -19,7 +20,6 @@ from bridgegen.drivers.noise import noise_key
 from bridgegen.drivers.user_drivers import Traits
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
-from bridgegen.simulation.choice import DEVICE
 from bridgegen.simulation.embedded._codes import (
     DOES,
     EVENT,
