@@ -35,13 +35,13 @@ from numba.core.runtime import rtsys
 
 from bridgegen.assess.conflict._judge_kernels import judge_row
 from bridgegen.assess.conflict._measure_kernels import implausible_row, measure_row
+from bridgegen.assess.conflict.judging import facts_of, measuring_of, verdict_of
 from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compilation.library import KernelLibrary
 from bridgegen.base.compiled import compile_for_kernels, row_type
 from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.assess.conflict.judging import facts_of, measuring_of, verdict_of
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded import portable
 from bridgegen.simulation.embedded._rollout_kernels import simulate_row

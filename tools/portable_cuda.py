@@ -3,6 +3,7 @@
 import gzip
 import re
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numba
@@ -11,13 +12,11 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic
-from portable import Kinds, kinds, machine_for, module_of, optimised, symbol_of
+from portable import kinds, machine_for, module_of, optimised, symbol_of
 
-from bridgegen.base.compilation.library import KernelLibrary
 from bridgegen.base.compiled import Bundle, _BundleModel, row_type
 from bridgegen.engine import _device_kernels as kernels
-from bridgegen.simulation.embedded import device as shipped
-from bridgegen.simulation.embedded import portable
+from bridgegen.simulation.embedded import device, portable
 from bridgegen.simulation.embedded.addresses import CALLED
 from bridgegen.simulation.embedded.drivers import ask
 
@@ -280,60 +279,56 @@ def _table(module: Any, bundle: FarBundle) -> Any:
 
 def linked() -> str:
     """Return all kernels as one module in LLVM's IR, with the entry for a GPU."""
-    near = kinds()
     e = np.zeros((1, 1))
-    given = shipped.Given(e, e, e, e.astype(np.uint64))
-    found = shipped.found_of(1, 1)
-    rows = Kinds(
-        *(
-            FarBundle(kind, "A" if name in shipped.INTERLEAVED else "C", name)
-            for name, kind in near._asdict().items()
-        )
-    )
-    own = [FarBundle(row_type(given), "C", "given"), FarBundle(row_type(found), "C", "found")]
-    run = symbol_of(kernels.run_row, (types.int64, *rows, *own))
+    own = {"given": device.Given(e, e, e, e.astype(np.uint64)), "found": device.found_of(1, 1)}
+    near = kinds()._asdict() | {name: row_type(bundle) for name, bundle in own.items()}
+    far = {
+        name: FarBundle(kind, "A" if name in device.INTERLEAVED else "C", name)
+        for name, kind in near.items()
+    }
+    rows = tuple(far.values())
+    run = symbol_of(kernels.run_row, (types.int64, *rows))
     called = {
         code: symbol_of(kernel, (*first, *rows[:4]))
         for code, (kernel, first) in enumerate(CALLED.items(), 1)
         if kernel is not ask  # which calls a user's code by its address
     }
-    text = module_of([run, *called.values()])
-    open("/tmp/gpu_far_raw.ll", "w").write(text)
-    import pickle
-
-    bundles = [*rows, *own]
-    tables = {bundle.title: sum(map(_words, bundle.held.types)) for bundle in bundles}
-    pickle.dump((run, called, tables), open("/tmp/gpu_far.pkl", "wb"))
-    return with_entry(text, run, called, tables)
+    tables = {name: sum(map(_words, bundle.held.types)) for name, bundle in far.items()}
+    return with_entry(module_of([run, *called.values()]), run, called, tables)
 
 
-def with_entry(text: str, run: str, called: dict[int, str], tables: dict[str, int]) -> str:
-    """Return a module with the entry, in which kernels are called by a switch."""
+def with_entry(text: str, run: str, called: Mapping[int, str], tables: Mapping[str, int]) -> str:
+    """Return a module with the entry, in which kernels are called by a switch.
+
+    Args:
+        text: the module.
+        run: the symbol of ``run_row``.
+        called: symbols of the kernels that are called by their number.
+        tables: the words of each bundle's table.
+    """
     text = re.sub(r"^@table_.*$", "", text, flags=re.MULTILINE)
     text, calls = _switched(text, called)
     text = re.sub(r"frem double (.*), (\S+)", r"call double @rest(double \1, double \2)", text)
-    if not re.search(r"^declare double @llvm.copysign.f64", text, re.MULTILINE):
+    if "declare double @llvm.copysign.f64" not in text:
         text += "\ndeclare double @llvm.copysign.f64(double, double)"
-    words = "\n".join(
-        f"  %{name} = call i64 @word(i64 {at})"
-        for at, name in enumerate(shipped.JOB)
-        if name.islower()
+    places = {name: at for at, name in enumerate(device.JOB)}
+    loaded = (f"  %{name} = call i64 @word(i64 {at})" for name, at in places.items())
+    known = (
+        f"@table_{name} = addrspace({CONSTANT}) externally_initialized global [{size} x i64] "
+        "zeroinitializer"
+        for name, size in tables.items()
     )
     return text + ENTRY.format(
-        job=len(shipped.JOB),
-        tables="\n".join(
-            f"@table_{title} = addrspace(4) externally_initialized global [{size} x i64] "
-            "zeroinitializer"
-            for title, size in tables.items()
-        ),
+        job=len(places),
+        tables="\n".join(known),
         calls=calls,
-        words=words,
+        words="\n".join(line for name, line in zip(places, loaded, strict=True) if name.islower()),
         run=run,
-        **{name: at for at, name in enumerate(shipped.JOB) if name.isupper()},
+        **{name: at for name, at in places.items() if name.isupper()},
     )
 
 
-def _switched(text: str, called: dict[int, str]) -> tuple[str, str]:
+def _switched(text: str, called: Mapping[int, str]) -> tuple[str, str]:
     """Return a module that calls kernels by their number, and the functions that do so."""
     # The first word of each parameter; attributes may follow, and have parentheses.
     kinds_of = {
@@ -344,51 +339,43 @@ def _switched(text: str, called: dict[int, str]) -> tuple[str, str]:
     made: dict[str, str] = {}
 
     def replaced(found: re.Match[str]) -> str:
-        given = found.group(3)
-        kinds_here = ", ".join(part.split()[0] for part in given.split(","))
-        name = made.setdefault(kinds_here, f"call.{len(made)}")
-        return f"{found.group(1)}call i32 @{name}(ptr {found.group(2)}, {given})"
+        result, code, given = found.groups()
+        here = ", ".join(part.split()[0] for part in given.split(","))
+        name = made.setdefault(here, f"call.{len(made)}")
+        return f"{result}call i32 @{name}(ptr {code}, {given})"
 
-    text = re.sub(r"^(\s+%\S+ = )call i32 (%[^\s(]+)\((.*)\)", replaced, text, flags=re.MULTILINE)
-    text = re.sub(r"^\s+call void %[^\s(]+\(.*\)$", "", text, flags=re.MULTILINE)
+    pattern = r"^(\s+%\S+ = )call i32 (%[^\s(]+)\((.*)\)"
+    text = re.sub(pattern, replaced, text, flags=re.MULTILINE)
     functions = []
-    for kinds_here, name in made.items():
-        each = kinds_here.split(", ")
-        params = ", ".join(f"{kind} %a{i}" for i, kind in enumerate(each))
-        fitting = {
-            code: symbol for code, symbol in called.items() if kinds_of[symbol] == kinds_here
-        }
-        assert fitting, kinds_here
-        cases = " ".join(f"i64 {code}, label %c{code}" for code in fitting)
+    for here, name in made.items():
+        given = ", ".join(f"{kind} %a{i}" for i, kind in enumerate(here.split(", ")))
+        fitting = [code for code, symbol in called.items() if kinds_of[symbol] == here]
         blocks = "\n".join(
-            f'c{code}:\n  %r{code} = call i32 @"{symbol}"({params})\n  ret i32 %r{code}'
-            for code, symbol in fitting.items()
+            f"c{code}:\n  %r{code} = call i32 @{called[code]}({given})\n  ret i32 %r{code}"
+            for code in fitting
         )
+        cases = " ".join(f"i64 {code}, label %c{code}" for code in fitting)
         functions.append(
-            f"define internal i32 @{name}(ptr %code, {params}) {{\n"
-            f"  %number = ptrtoint ptr %code to i64\n"
+            f"define internal i32 @{name}(ptr %code, {given}) {{\n"
+            "  %number = ptrtoint ptr %code to i64\n"
             f"  switch i64 %number, label %none [ {cases} ]\nnone:\n  ret i32 0\n{blocks}\n}}"
         )
     return text, "\n".join(functions)
 
 
+def emitted(text: str) -> str:
+    """Return a module as PTX; its first line says of which kernels it is."""
+    machine = machine_for(TRIPLE, PROCESSOR, FEATURES)
+    # Said first: numbers of 8 bytes then lie as they do on the device.
+    text = f'target datalayout = "{machine.target_data}"\n{text}'
+    exports = {"rows", "job", *re.findall(r"^@(table_\w+) =", text, re.MULTILINE)}
+    ptx = machine.emit_assembly(optimised(text, machine, TRIPLE, exports))
+    return f"// bridgegen {portable.device_sources()}\n{ptx}"
+
+
 def write() -> None:
     """Write the module."""
     clock = time.time()
-    text = linked()
-    print(f"linked {time.time() - clock:.0f} s", flush=True)
-    finish(text)
-
-
-def finish(text: str) -> None:
-    clock = time.time()
-    machine = machine_for(TRIPLE, PROCESSOR, FEATURES)
-    text = f'target datalayout = "{machine.target_data}"\n{text}'
-    exports = {"rows", "job", *re.findall(r"^@(table_\w+) =", text, re.MULTILINE)}
-    module = optimised(text, machine, TRIPLE, exports)
-    ptx = f"// bridgegen {portable.device_sources()}\n{machine.emit_assembly(module)}"
-    packed = gzip.compress(ptx.encode(), 9, mtime=0)
-    shipped.PATH.write_bytes(packed)
-    open("/tmp/gpu.ptx", "w").write(ptx)
-    open("/tmp/gpu_opt.ll", "w").write(str(module))
-    print(f"{shipped.PATH}: {len(ptx):,} B, {len(packed):,} packed, {time.time() - clock:.0f} s")
+    ptx = emitted(linked())
+    device.PATH.write_bytes(packed := gzip.compress(ptx.encode(), 9, mtime=0))
+    print(f"{device.PATH}: {len(ptx):,} B, {len(packed):,} packed, {time.time() - clock:.0f} s")

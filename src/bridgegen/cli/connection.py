@@ -1,4 +1,4 @@
-"""Options that several commands share: the connection to a simulator, and the folder of maps."""
+"""Options that several commands share: connections to simulators, the folder of maps, the device."""
 
 import inspect
 import os
@@ -168,6 +168,8 @@ def with_device(command: Callable[..., Any]) -> Callable[..., None]:
             if device is not None:
                 from bridgegen.simulation.embedded.device import current
 
+                if str(values.get("workers") or "").startswith("ray"):
+                    raise InputError(f"--device {device} is this machine's, got --workers ray")
                 current()
             command(**values)
 

@@ -71,8 +71,8 @@ MANY = 20
 """Number of options above which the help of a command leaves out those that are `RARE`."""
 
 _RARE = (
-    "adversary ahead axes carla-command carla-timeout cause causes count detector distinct "
-    "distribution empty-trigger esmini-lib exposure host ideal maps metrics name objectives "
+    "adversary ahead axes carla-command carla-timeout cause causes count detector device "
+    "distinct distribution empty-trigger esmini-lib exposure host ideal maps metrics name objectives "
     "others place port record repeats scale screen screen-batch screen-budget screen-set set "
     "simulator-set time-limit triage vehicle weights workers worse-than"
 )

@@ -4,7 +4,7 @@ The kernels are those of a rollout's analysis, so that all numbers have the same
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -17,6 +17,7 @@ from bridgegen.assess.conflict.analysis import IS_SO, NUMBERS, WHOLES, Conflicts
 from bridgegen.assess.conflict.judging import facts_of, measuring_of, verdict_of
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.cuda import DEVICE
+from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.runner import Runner
 from bridgegen.simulation.embedded import _memory_kernels as memory
 
@@ -28,32 +29,46 @@ class Judged:
     Attributes:
         status: ``(N,)`` int8, see `Rollout`.
         code: ``(N,)`` int64, of `Implausible`.
-        worst: ``(N,)`` int64, the highest kind of a row's conflicts, without violations.
+        worst: ``(N,)`` int64, the highest kind of a row's conflicts.
         touches: ``(N,)`` bool, whether the ego's box meets another.
-        conflicts: of some rows that succeeded, without violations; see `analysis.encounters`.
+        n_steps: ``(N,)`` int64, see `Rollout`.
+        metrics: ``(N, M)`` those that were asked for, NaN of a row that failed.
+        conflicts: of some rows that succeeded; see `analysis.encounters`.
     """
 
     status: npt.NDArray[np.int8]
     code: Int
     worst: Int
     touches: Bool
+    n_steps: Int
+    metrics: Float
     conflicts: Callable[[Int], Conflicts]
 
 
-def judge(runner: Runner, X: Float, *, until_collision: bool = False) -> Judged | None:
+def judge(
+    runner: Runner,
+    X: Float,
+    *,
+    until_collision: bool = False,
+    violations: bool = False,
+    metrics: Sequence[str] = (),
+) -> Judged | None:
     """Judge N rows of one storyboard on this process's device; None where there is none.
 
     Args:
         runner: has the storyboard.
         X: ``(N, len(space.names))`` feasible rows.
         until_collision: whether a row may end with a collision of the ego's.
+        violations: whether the ego's are among its conflicts; where its route changes lanes, only
+            those of the rows in which it has not.
+        metrics: of ``_measure_kernels.MEASURED``.
     """
     if not os.environ.get(DEVICE) or runner.refused or not len(X):
         return None
     # Numba is slow to import.
     from bridgegen.assess.conflict._judge_kernels import Facts
     from bridgegen.assess.conflict._measure_kernels import MEASURED, Measuring
-    from bridgegen.engine._device_kernels import JUDGED
+    from bridgegen.engine._device_kernels import FIRST_METRIC, JUDGED, VIOLATIONS
     from bridgegen.simulation.embedded import device
     from bridgegen.simulation.embedded.batch import Batch
 
@@ -63,14 +78,19 @@ def judge(runner: Runner, X: Float, *, until_collision: bool = False) -> Judged 
     like = Batch(
         program, roads, networks[first], runner.columns(X[first]), None, None, until_collision
     )
+    template = device.template_of(like.state)  # before it stands, which ends its rows
     rollout = like.standing()
     e, t = rollout.shape[1:]
     each = range(len(first))
-    facts = [facts_of(rollout, p, np.zeros((0, 8))) for p in each]
+    there = networks[first].tolist()
+    corridors = roads.corridors(there) if violations else np.zeros((len(there), 0, CORRIDOR))
+    facts = [facts_of(rollout, p, corridors[p]) for p in each]
     if facts[0].own_bodies != 1:
         return None
     judging = device.Judging(
-        JUDGED,
+        JUDGED
+        | (VIOLATIONS if violations else 0)
+        | sum(FIRST_METRIC << MEASURED.index(name) for name in metrics),
         _stacked(Facts, facts),
         _stacked(Measuring, [measuring_of(rollout, p) for p in each]),
         verdict_of(e, t),
@@ -78,7 +98,6 @@ def judge(runner: Runner, X: Float, *, until_collision: bool = False) -> Judged 
     )
     given = device.own_of(program, roads, networks, runner.columns(X))
     plan = device.coded(like.plan, program)
-    template = device.template_of(like.state)
 
     def run(at: Int) -> device.Found:
         own = device.some_of(given, at)
@@ -100,6 +119,8 @@ def judge(runner: Runner, X: Float, *, until_collision: bool = False) -> Judged 
         found.code[:, 0],
         found.worst[:, 0],
         found.instants[:, 0] >= 0,
+        found.ending[:, memory.N_STEPS],
+        found.metrics[:, [MEASURED.index(name) for name in metrics]],
         partial(_conflicts, found, rollout),
     )
 
@@ -129,8 +150,8 @@ def _conflicts(found: Any, rollout: Any, at: Int) -> Conflicts:
         delta_v_other=changes[:, :, 1],
         ok=np.ones(len(at), np.bool_),
         body=np.zeros(shape, np.int64),
-        aside=np.zeros(shape),
-        breach=np.zeros(shape),
+        aside=found.aside[at],
+        breach=found.breach[at],
         left_hand=rollout.left_hand,
         country=rollout.country,
     )

@@ -226,10 +226,20 @@ class Judging(NamedTuple):
 
 
 class Device:
-    """A GPU that rolls rows out; several threads may use it."""
+    """A GPU that rolls rows out; several threads may use it.
+
+    Attributes:
+        name: of the GPU.
+
+    Raises:
+        InputError: there is no GPU, or this installation has no kernels for it.
+    """
 
     def __init__(self) -> None:
+        if not PATH.is_file():
+            raise InputError("--device cuda: this installation has no kernels for GPUs")
         self._gpu = Gpu(gzip.decompress(PATH.read_bytes()))
+        self.name = self._gpu.name
         self._lock = Lock()
         self._entry = self._gpu.function("rows")
         self._rooms: dict[str, tuple[int, int]] = {}
@@ -312,7 +322,7 @@ class Device:
                 return self._run(plan, roads, networks, given, states, template, records, judging)
             except OutOfMemory as error:
                 raise WorkersError(
-                    f"the GPU ({self._gpu.name}) has too little memory ({error})"
+                    f"the GPU ({self.name}) has too little memory ({error})"
                 ) from None
 
     def _run(
@@ -350,7 +360,11 @@ class Device:
         each = sizes["state"] // LANES + heap
         if judging:
             each += (sizes["record"] + sizes["verdict"]) // LANES
-        content: dict[str, npt.NDArray[Any]] = {"plan": packed(plan, 0), "roads": packed(roads, 1), "given": packed(given, 1)}
+        content: dict[str, npt.NDArray[Any]] = {
+            "plan": packed(plan, 0),
+            "roads": packed(roads, 1),
+            "given": packed(given, 1),
+        }
         content |= {"TEMPLATE": template, "networks": np.ascontiguousarray(networks)}
         if judging:
             content |= {
