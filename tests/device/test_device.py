@@ -91,7 +91,7 @@ def test_with_little_memory_fewer_threads_do_the_same(gpu, monkeypatch):
     want = pipeline.runner.run(X)
     monkeypatch.setenv(DEVICE, "cuda")
     blocks = []
-    for free in (2**30, 20 * 2**20):
+    for free in (2**30, 26 * 2**20):
         gpu.free = free
         gpu.blocks.clear()
         device._opened.cache_clear()

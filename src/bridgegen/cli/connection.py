@@ -1,4 +1,4 @@
-"""Options that several commands share: connections to simulators, the folder of maps, the device."""
+"""Options that commands share: connections to simulators, the folder of maps, the device."""
 
 import inspect
 import os
