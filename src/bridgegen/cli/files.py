@@ -22,6 +22,8 @@ _OF_FLAVOUR = {
     "page": {"scenarios", "ego"},
     "xosc": set[str](),
     "osi": {"scenarios", "ego"},
+    "rerun": {"scenarios", "ego"},
+    "openlabel": {"scenarios", "ego"},
 }
 """Options of the flavours that are no OpenSCENARIO of a run's scenarios."""
 
@@ -43,8 +45,9 @@ def export(
             help="1.2 or 1.3: with parameters; resolved: without; recorded: timed trajectories; "
             "carla: 1.0 for ScenarioRunner, timed trajectories for all but the ego; video: a film; "
             "page: one crash with its player and files as one page to send; parquet: all "
-            "evaluations as tables; osi: the motion as ASAM OSI in MCAP; xosc: OpenDRIVE and "
-            "OpenSCENARIO of individuals.",
+            "evaluations as tables; osi: the motion as ASAM OSI in MCAP; rerun: recordings for the "
+            "viewer Rerun; openlabel: tags for scenario bases; xosc: OpenDRIVE and OpenSCENARIO of "
+            "individuals.",
             autocompletion=completing("flavour"),
         ),
     ],
@@ -117,7 +120,7 @@ def export(
     Scenarios each with their map. DuckDB, Polars and pandas read parquet files as one table. A film
     has the report's view, of the ego and the participant that it meets.
     """
-    from bridgegen.jobs.search.export import FLAVOURS, export_traces
+    from bridgegen.jobs.search.export import FLAVOURS, export_beside, export_traces
     from bridgegen.jobs.search.export import export as export_scenarios
     from bridgegen.jobs.search.report import write_finding_page
     from bridgegen.jobs.search.table import write_tables
@@ -152,6 +155,8 @@ def export(
         written = [write_finding_page(sources[0], name, out, ego=ego)]
     elif flavour == "osi":
         written = export_traces(sources[0], out=out, notes=notes, **given)
+    elif flavour in ("rerun", "openlabel"):
+        written = export_beside(sources[0], flavour, out=out, **given)
     elif flavour == "xosc":
         written, notes = convert_file(sources[0], out)
     else:

@@ -154,6 +154,13 @@ Junit = Annotated[
         help="Write the verdict as JUnit XML, for Jenkins, GitLab …", rich_help_panel=OUTPUT
     ),
 ]
+Needs = Annotated[
+    Path | None,
+    typer.Option(
+        help="Write the pass criteria with their results as needs.json, for sphinx-needs.",
+        rich_help_panel=OUTPUT,
+    ),
+]
 
 
 def read_simulator(

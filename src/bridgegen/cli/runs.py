@@ -84,7 +84,7 @@ def search_catalogue(
     from bridgegen.jobs.search.campaign import folder_word
     from bridgegen.scenario.language.reader import names
 
-    if extra := [name for name in (SCENARIO, SAVE, "junit") if name in given]:
+    if extra := [name for name in (SCENARIO, SAVE, "junit", "needs") if name in given]:
         named = " and ".join(name if name == SCENARIO else f"--{name}" for name in extra)
         raise InputError(f"--catalogue searches every scenario of the catalogue: no {named}")
     driver = "own-drivers"
@@ -206,6 +206,7 @@ def search(
     ] = None,
     fail_if: common.FailIf = None,
     junit: common.Junit = None,
+    needs: common.Needs = None,
     verbose: common.Verbose = False,
     save: common.Save = None,
 ) -> None:
@@ -229,6 +230,7 @@ def search(
         junit,
         causes=options.causes,
         criteria=margins_of(scenario, options) if fail_if else (),
+        needs=needs,
     )
     chosen, cheap = common.read_simulators(simulator, simulator_set, screen, screen_set, connection)
     options = replace(options, simulator=chosen or EMBEDDED, screen=cheap)
@@ -292,6 +294,7 @@ def resume(
     workers: common.Workers = None,
     fail_if: common.FailIf = None,
     junit: common.Junit = None,
+    needs: common.Needs = None,
     verbose: common.Verbose = False,
 ) -> None:
     """Resume an interrupted run.
@@ -302,7 +305,7 @@ def resume(
     from bridgegen.cli.verdict.of_run import PassFailCriteria
     from bridgegen.jobs import search as campaign
 
-    criteria = PassFailCriteria.of_run(fail_if or (), junit, folder)
+    criteria = PassFailCriteria.of_run(fail_if or (), junit, folder, needs)
     with SearchProgress() as live:
         run = campaign.resume(
             folder,

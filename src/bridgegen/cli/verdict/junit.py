@@ -116,10 +116,20 @@ def _legal(text: str) -> str:
 
 
 def refuse_junit(path: Path) -> None:
+    """Reject a path that is not `writable` as JUnit XML."""
+    writable(path, "<testsuite", "JUnit XML")
+
+
+def writable(path: Path, mark: str, what: str) -> None:
     """Reject a path that is not writable, or at which another kind of file exists.
 
+    Args:
+        path: of the file.
+        mark: text that is in the beginning of each file of that kind.
+        what: the kind.
+
     Raises:
-        StorageError: its folder cannot be created, or a file exists that is not JUnit XML.
+        StorageError: its folder cannot be created, or a file exists that is of another kind.
     """
     # Asked before the run, too, which may take hours: the folder is made only after it.
     folder = next(parent for parent in path.absolute().parents if parent.exists())
@@ -127,13 +137,13 @@ def refuse_junit(path: Path) -> None:
         raise StorageError(f"{path}: cannot be written: {folder} is not a writable folder")
     try:
         with path.open("rb") as file:
-            ours = b"<testsuite" in file.read(_HEAD)
+            ours = mark.encode() in file.read(_HEAD)
     except FileNotFoundError:
         return
     except OSError as error:
         raise StorageError(f"{path}: cannot be written: {error.strerror}") from None
     if not ours:
-        raise StorageError(f"{path}: exists already, is not JUnit XML, and is not overwritten")
+        raise StorageError(f"{path}: exists already, is not {what}, and is not overwritten")
 
 
 def write_junit(path: Path, suites: Iterable[Suite]) -> None:

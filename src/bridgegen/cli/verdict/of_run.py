@@ -19,7 +19,8 @@ from bridgegen.cli.verdict.fail_if import (
     unless_judged,
     words_of,
 )
-from bridgegen.cli.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
+from bridgegen.cli.verdict.junit import Case, Suite, case_of, refuse_junit, writable, write_junit
+from bridgegen.cli.verdict.needs import MARK, write_needs
 from bridgegen.drivers import STORYBOARD
 from bridgegen.jobs.search.exported import Facts, ParameterValue, Quantity, read_facts
 from bridgegen.jobs.search.run import Run
@@ -69,10 +70,12 @@ class PassFailCriteria:
     Attributes:
         conditions: each fails the run if it holds.
         junit: path of the JUnit XML, or None.
+        needs: path of the needs.json of the pass criteria, or None.
     """
 
     conditions: tuple[FailCondition, ...]
     junit: Path | None
+    needs: Path | None = None
 
     @classmethod
     def read(
@@ -82,6 +85,7 @@ class PassFailCriteria:
         *,
         causes: bool = True,
         criteria: Sequence[str] = (),
+        needs: Path | None = None,
     ) -> Self:
         """Read the criteria.
 
@@ -91,30 +95,35 @@ class PassFailCriteria:
             causes: whether the run determines causes.
             criteria: the names of the margins of its pass criteria, figures too: each is the
                 number of evaluations that violate it.
+            needs: a new file, or an earlier needs.json.
 
         Raises:
             InputError: a text is not a condition; a figure is unknown, or is a cause although the
                 run determines none.
-            StorageError: the JUnit XML cannot be written.
+            StorageError: the JUnit XML, or the needs.json, cannot be written.
         """
-        found = cls(read_conditions(texts, (*FIGURES, *criteria)), junit)
+        found = cls(read_conditions(texts, (*FIGURES, *criteria)), junit, needs)
         if not causes and (named := sorted(found.figures & _CAUSES.keys())):
             raise InputError(
                 f"--fail-if names {', '.join(named)}, but this run does not determine causes"
             )
         if junit is not None:
             refuse_junit(junit)
+        if needs is not None:
+            writable(needs, MARK, "needs.json")
         return found
 
     @classmethod
-    def of_run(cls, texts: Sequence[str], junit: Path | None, folder: Path) -> Self:
+    def of_run(
+        cls, texts: Sequence[str], junit: Path | None, folder: Path, needs: Path | None = None
+    ) -> Self:
         """Read the criteria for an existing run; see ``read``."""
-        if not texts and junit is None:
+        if not texts and junit is None and needs is None:
             return cls((), None)
         settings = Run(folder).settings
         # The run's own settings decide which figures exist, not the options of this call.
         names = [read_criterion(criterion).quantity for criterion in settings.criteria]
-        return cls.read(texts, junit, causes=settings.causes, criteria=names)
+        return cls.read(texts, junit, causes=settings.causes, criteria=names, needs=needs)
 
     @property
     def figures(self) -> set[str]:
@@ -128,7 +137,7 @@ class PassFailCriteria:
         there is none but that, and it only where the run was not judged.
         """
         # A run that says nothing of its driver never passes, whatever was asked.
-        if not self.conditions and self.junit is None:
+        if not self.conditions and self.junit is None and self.needs is None:
             return () if run.verdict != NOT_JUDGED else (_searched(run),)
         figures = figures_of(run)
         stated = (
@@ -140,6 +149,8 @@ class PassFailCriteria:
         outcomes = (_searched(run), *unless_judged(stated, _why_not(run), _NOT_OF_THE_EGO))
         if self.junit is not None:
             write_junit(self.junit, _suites(run, outcomes))
+        if self.needs is not None:
+            write_needs(self.needs, run, outcomes[len(outcomes) - len(run.criteria) :])
         return outcomes
 
 

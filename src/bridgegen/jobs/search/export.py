@@ -17,12 +17,16 @@ from bridgegen.base.errors import (
     UnknownNameError,
     UnsupportedError,
 )
+from bridgegen.base.extras import require
 from bridgegen.drivers.drivers import CODES, DRIVERS, SCRIPTED
 from bridgegen.drivers.noise import noise_key
 from bridgegen.engine.simulate import FileResult, simulate_file
 from bridgegen.engine.stated import keyed
-from bridgegen.jobs.search.exported import FOLDER, MINIMAL
+from bridgegen.jobs.search.exported import FOLDER, MINIMAL, read_parameters
+from bridgegen.jobs.search.openlabel import openlabel
+from bridgegen.jobs.search.restored import searched
 from bridgegen.jobs.search.run import Run
+from bridgegen.jobs.search.scenarios import load
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
@@ -34,6 +38,8 @@ from bridgegen.openx.openscenario.scenario_runner.convert import CONTROL, for_sc
 from bridgegen.openx.openscenario.write import VERSIONS, least_version, to_version, to_xml
 from bridgegen.openx.prepared import logic_path, prepared, roads_of
 from bridgegen.openx.xml import read_bytes
+from bridgegen.pages.rerun import write_rerun
+from bridgegen.scenario.odd.states import states_of
 from bridgegen.simulation.embedded.compiler import compile_storyboard
 from bridgegen.simulation.osi.trace import ENDINGS, Surroundings, write_osi
 from bridgegen.simulation.recording import MAX_STATES
@@ -149,6 +155,76 @@ def export_traces(
         write_osi(paths, rollout, around)
         written += paths
     return written
+
+
+RERUN, OPENLABEL = "rerun", "openlabel"
+_ENDINGS = {RERUN: ".rrd", OPENLABEL: ".openlabel.json"}
+
+
+def export_beside(
+    source: Path,
+    flavour: str,
+    *,
+    scenarios: Sequence[str] = (),
+    out: Path | None = None,
+    ego: str | None = None,
+) -> list[Path]:
+    """Write of each scenario, as it is simulated, one file that no simulator runs.
+
+    Args:
+        source: the folder of a run, or one ``.xosc`` file.
+        flavour: "rerun", see `bridgegen.pages.rerun`, or "openlabel", tags of the scenario.
+        scenarios: names of a run's scenarios; all but the minimal ones by default.
+        out: the folder to write to; ``export/FLAVOUR`` in the run's or the file's by default.
+        ego: the driver of the ego; the files' by default.
+
+    Returns:
+        The files written.
+
+    Raises:
+        BridgeGenError: as `export`; or an extra is missing, or the scenario of the run is not what
+            it was.
+    """
+    if flavour == RERUN:
+        require(RERUN, "--flavour rerun")
+    paths = _chosen(source, scenarios)
+    folder = out or (source if source.is_dir() else source.parent) / EXPORT / flavour
+    tagged = None if flavour == RERUN else _tagging(source)
+    for path in paths:
+        result = _simulated(path, ego)
+        target = folder / f"{path.stem}{_ENDINGS[flavour]}"
+        _write({} if tagged is None else {target: tagged(path, result.rollout)}, folder, ())
+        if tagged is None:
+            write_rerun(target, result, path.stem)
+    return [folder / f"{path.stem}{_ENDINGS[flavour]}" for path in paths]
+
+
+def _tagging(source: Path) -> Callable[[Path, Rollout], bytes]:
+    """Return what tags a scenario of a run, or a file."""
+    if source.is_dir():
+        searched_scenario, _, roads = searched(Run(source))
+        states = states_of(searched_scenario, on_map=roads is not None)
+    else:
+        searched_scenario = load(source)
+        states = states_of(searched_scenario, on_map=True)
+    codes = {
+        name: {word: float(code) for code, word in enumerate(parameter.kind.names)}
+        for name, parameter in searched_scenario.parameters.items()
+    }
+
+    def tagged(path: Path, rollout: Rollout) -> bytes:
+        row: dict[str, float] = {}
+        if source.is_dir():
+            for name, of in read_parameters(path.with_suffix(".json")).items():
+                value = codes.get(name, {}).get(of.value) if isinstance(of.value, str) else of.value
+                row |= {} if value is None else {name: value}
+        else:
+            space = searched_scenario.space()
+            row = space.values(space.row({}))
+        scenario, _ = _read(path)
+        return openlabel(path.stem, _resolved(scenario, path), states, row, rollout)
+
+    return tagged
 
 
 def _of_recording(path: Path, notes: list[str]) -> Iterator[tuple[str, Rollout, Surroundings]]:

@@ -97,10 +97,13 @@ class _Origin(BaseModel):
         return self
 
 
-class Facts(_Origin):
+class _Values(BaseModel):
+    parameters: dict[str, ParameterValue]
+
+
+class Facts(_Origin, _Values):
     """What a scenario's ``.json`` says, as far as a verdict needs it."""
 
-    parameters: dict[str, ParameterValue]
     metrics: dict[str, Quantity]
     cause: str | None
     quick_cause: str | None = None
@@ -115,6 +118,15 @@ def read_facts(path: Path) -> Facts:
         StorageError: it is not what was written.
     """
     return _read(path, Facts)
+
+
+def read_parameters(path: Path) -> dict[str, ParameterValue]:
+    """Return the parameters that the ``.json`` of a scenario, a minimal one too, states.
+
+    Raises:
+        StorageError: it is not what was written.
+    """
+    return _read(path, _Values).parameters
 
 
 def not_exported(folder: Path) -> tuple[Refused, ...]:

@@ -63,6 +63,7 @@ class Table:
         units: by what they measure: the factor into the first.
         terms: of the ontology, by evidence: what states it.
         attributes: of the standard, by group, each with its evidence and a note.
+        tags: of ASAM OpenLABEL, each with its evidence.
     """
 
     quantities: Mapping[str, Mapping[str, Any]]
@@ -70,6 +71,7 @@ class Table:
     units: Mapping[str, Mapping[str, float]]
     terms: Mapping[str, Sequence[str]]
     attributes: Mapping[str, Mapping[str, str]]
+    tags: Mapping[str, Any]
 
 
 @cache
@@ -86,7 +88,8 @@ def table() -> Table:
             name, entry["at"], entry.get("quantity", ""), entry.get("bands") or {}, facts, types
         )
         concepts |= dict.fromkeys((name, *entry.get("also", ())), found)
-    return Table(data["quantities"], concepts, data["units"], data["terms"], data["attributes"])
+    rest = (data[name] for name in ("units", "terms", "attributes", "tags"))
+    return Table(data["quantities"], concepts, *rest)
 
 
 def concept_of(name: str) -> Concept | None:
@@ -200,6 +203,29 @@ class States:
             return ["true" if known["true"] else "false"]
         seen = {concept.facts[value]: value for value in reversed(known) if known[value]}
         return sorted(seen.values())
+
+    def tags(self, row: Mapping[str, float]) -> dict[str, float | bool | None]:
+        """Return of each tag of ASAM OpenLABEL whether it holds for a row, or its value.
+
+        Those that this scenario states nothing of are left out.
+
+        Args:
+            row: values of parameters and derived quantities, by name.
+        """
+        found: dict[str, float | bool | None] = {}
+        for tag, evidence in table().tags.items():
+            if isinstance(evidence, str):
+                if (met := self._fact(evidence)) is not None:
+                    found[tag] = met
+                continue
+            quantity, above, up_to, *states = evidence
+            formula = self.quantities.get(quantity)
+            if formula is not None and formula.names <= row.keys():
+                x = float(formula.evaluate(row))
+                found[tag] = (x if states else True) if above < x <= up_to else False
+            elif not self.on_map and quantity in ("curve_radius", "roundabout_diameter"):
+                found[tag] = False
+        return found
 
     # -- evidence ------------------------------------------------------------------------------
 

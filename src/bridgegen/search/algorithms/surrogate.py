@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.search.algorithms.algorithm import Arity, Problem, Results, Setting, Value, resolve
 from bridgegen.search.algorithms.sampling import latin_hypercube, sobol_rows
@@ -151,7 +152,7 @@ class Surrogate(Saved):
         rng, known, shape = self._rng, self._known, (CANDIDATES, self._n_var)
         anywhere = sobol_rows(rng, CANDIDATES, self._n_var)
         base = bases[rng.integers(len(bases), size=CANDIDATES)]
-        scale = REACH * 2.0 ** (-3.0 * rng.random((CANDIDATES, 1)))
+        scale = REACH * elementary.power(2.0, -3.0 * rng.random((CANDIDATES, 1)))
         # At most some twenty parameters change, as in TuRBO.
         share = min(1.0, 20.0 / self._n_var) * rng.random((CANDIDATES, 1))
         moved = rng.random(shape) < share

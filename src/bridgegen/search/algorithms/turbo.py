@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.search.algorithms.algorithm import Arity, Problem, Results, Setting, Value, resolve
@@ -203,7 +204,7 @@ class TuRBO(Saved):
         lengths = np.ones(n_var) if region.parameters is None else region.parameters.lengths
         # A region is long where the objective changes slowly; its volume stays that of a cube of
         # this length (the source).
-        sides = region.length * lengths / np.exp(np.log(lengths).mean())
+        sides = region.length * lengths / elementary.exp(float(elementary.log(lengths).mean()))
         centre = self._known.U[self._centre(region)]
         low, high = np.clip(centre - sides / 2, 0.0, 1.0), np.clip(centre + sides / 2, 0.0, 1.0)
         # A level has no neighbours, so a box around it means nothing.

@@ -5,6 +5,7 @@ from typing import Self
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.search.surrogates import _gaussian_process_kernels as kernels
 from bridgegen.search.surrogates.subset import telling
@@ -12,7 +13,7 @@ from bridgegen.search.surrogates.subset import telling
 # --- The parameters of a Gaussian process, and what is believed of them before any row is known ---
 
 
-LOW, HIGH = np.log([0.02, 0.05, 1e-4]), np.log([50.0, 20.0, 0.5])
+LOW, HIGH = elementary.log([0.02, 0.05, 1e-4]), elementary.log([50.0, 20.0, 0.5])
 """Least and greatest length, variance and noise."""
 
 
@@ -35,23 +36,22 @@ class Parameters:
     @property
     def lengths(self) -> Float:
         """``(d,)`` float64, the distance over which the process changes in each column."""
-        lengths: Float = np.exp(self.logs[:-2])
-        return lengths
+        return elementary.exp(self.logs[:-2])
 
     @property
     def variance(self) -> float:
         """Of the process."""
-        return float(np.exp(self.logs[-2]))
+        return elementary.exp(float(self.logs[-2]))
 
     @property
     def noise(self) -> float:
         """Variance of the noise."""
-        return float(np.exp(self.logs[-1]))
+        return elementary.exp(float(self.logs[-1]))
 
 
 def prior(d: int) -> tuple[Float, Float]:
     """Return mean and standard deviation of the logarithms, normally distributed."""
-    mean = np.concatenate([np.full(d, np.log(0.5 * np.sqrt(d))), np.log([1.0, 1e-2])])
+    mean = np.concatenate([np.full(d, elementary.log(0.5 * d**0.5)), elementary.log([1.0, 1e-2])])
     spread = np.concatenate([np.full(d, 1.0), [1.0, 2.0]])
     return mean, spread
 
@@ -112,7 +112,7 @@ def _density(points: Float, values: Float, logs: Float) -> tuple[float, Float]:
     alpha = _weights(R, values)
     gradient = kernels.likelihood_gradient(scaled, K, kernels.inverse(R), alpha, now.variance)
     gradient[-1] *= now.noise
-    fit = 0.5 * np.sum(values * alpha) + np.log(np.diagonal(R)).sum()
+    fit = 0.5 * np.sum(values * alpha) + elementary.log(np.diagonal(R)).sum()
     return float(-fit - 0.5 * np.sum(off * off)), gradient - off / spread
 
 
@@ -181,7 +181,7 @@ class GaussianProcess:
         noise = np.sqrt(p.noise) * rng.standard_normal((len(self._centred), n))
 
         def of_prior(at: Float) -> Float:
-            waves = np.cos(kernels.product(at, frequencies) + phases)
+            waves = elementary.cos(kernels.product(at, frequencies) + phases)
             path: Float = kernels.product(waves, weights)
             return path
 

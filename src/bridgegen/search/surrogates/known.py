@@ -4,6 +4,7 @@ from math import prod
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.search.algorithms.algorithm import Problem
 
@@ -84,7 +85,7 @@ def compressed(F: Float) -> Float:
     spread = known.std()
     if not spread > 1e-12:
         return np.zeros(len(F))
-    scores: Float = np.sign(values) * np.log1p(np.abs(values) / spread)
+    scores: Float = np.sign(values) * elementary.log(1.0 + np.abs(values) / spread)
     return scores
 
 

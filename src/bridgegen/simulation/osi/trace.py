@@ -178,10 +178,8 @@ def _codes(enum: str, where: Any, value: str) -> Any:
 
 def _object(rollout: Rollout, row: int, e: int, n: int) -> Parts:
     """Return a participant at its n instants."""
-    known = len(rollout.kinds) and rollout.kinds[e] >= 0
-    kind = kinds.NAMES[rollout.kinds[e]] if known else ""
+    kind, height = _kind_of(rollout, e), height_of(rollout, e)
     length, width, ahead = rollout.box[e].tolist()
-    height = _HEIGHTS.get(kind, _HEIGHT)
     x, y, h, v, a = (getattr(rollout, name)[row, e, :n] for name in ("x", "y", "h", "v", "a"))
     cos, sin = elementary.cos(h), elementary.sin(h)
     rate = np.gradient(h, rollout.time_step) if n > 1 else np.zeros(n)
@@ -216,6 +214,16 @@ def _object(rollout: Rollout, row: int, e: int, n: int) -> Parts:
         **vehicle,
         source_reference=[message("ExternalReference", type=_SOURCE, identifier=identifier)],
     )
+
+
+def _kind_of(rollout: Rollout, e: int) -> str:
+    known = len(rollout.kinds) and rollout.kinds[e] >= 0
+    return kinds.NAMES[rollout.kinds[e]] if known else ""
+
+
+def height_of(rollout: Rollout, e: int) -> float:
+    """Return the usual height of a participant's kind [m]."""
+    return _HEIGHTS.get(_kind_of(rollout, e), _HEIGHT)
 
 
 def _lights(rollout: Rollout, row: int, e: int, n: int) -> Parts:
