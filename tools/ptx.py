@@ -5,6 +5,9 @@ are rounded as PTX says (``.rn``), a multiplication and an addition are one oper
 has ``fma``. Source: PTX ISA, https://docs.nvidia.com/cuda/parallel-thread-execution/.
 """
 
+# ruff: noqa: D102, N815
+# The methods of a function are named after what they write, those of a driver by NVIDIA.
+
 import ctypes
 import hashlib
 import re
@@ -20,10 +23,6 @@ from bridgegen.base.disk import write_whole
 SPECIAL = {"%tid.x": "tid", "%ctaid.x": "ctaid", "%ntid.x": "ntid", "%nctaid.x": "nctaid"}
 BITS = {"pred": 1, **{f"{kind}{n}": n for kind in "bsuf" for n in (8, 16, 32, 64)}}
 FLOAT = {32: "float", 64: "double"}
-COMPARES = {
-    **dict.fromkeys(("eq", "ne"), ("", "oeq", "one")),
-    **dict.fromkeys(("lt", "le", "gt", "ge"), ("",)),
-}
 MATH = {
     "sqrt.rn": "sqrt",
     "cvt.rmi": "floor",
@@ -166,8 +165,8 @@ class Function:
             return
         if found := re.match(r"\.reg \.(\w+)\s+(%\w+)(?:<(\d+)>)?;", line):
             kind, name, count = found.groups()
-            for name in [name] if count is None else [f"{name}{i}" for i in range(int(count))]:
-                self.slot(name, BITS[kind])
+            for one in [name] if count is None else [f"{name}{i}" for i in range(int(count))]:
+                self.slot(one, BITS[kind])
             return
         if found := re.match(r"\.local \.align (\d+) \.b8\s+(\w+)\[(\d+)\];", line):
             align, name, size = found.groups()
@@ -316,7 +315,8 @@ class Function:
         if to[0] == "f" and what[0] == "f":
             x = self.real(given[1], a)
             how = MATH.get(f"cvt.{parts[1]}")
-            assert a == b and how, parts
+            assert a == b, parts
+            assert how, parts
             self.set_real(
                 given[0], b, self.new(f"call {FLOAT[a]} @llvm.{how}.f{a}({FLOAT[a]} {x})")
             )
@@ -435,11 +435,7 @@ class Function:
                 found = self.new(f"trunc i32 {found} to i{bits}")
             self.set(given[0], bits, found)
             return
-        x = (
-            [self.get(one, bits) for one in given[1:3]]
-            if name not in ("mad",)
-            else [self.get(one, bits) for one in given[1:3]]
-        )
+        x = [self.get(one, bits) for one in given[1:3]]
         if name in ("add", "sub", "and", "or", "xor"):
             found = self.new(f"{name} i{bits} {x[0]}, {x[1]}")
         elif name in ("div", "rem"):
@@ -505,7 +501,10 @@ def to_llvm(ptx: str) -> str:
     """Return a module of PTX as one of LLVM's."""
     found = {one.name: one for one in functions(ptx)}
     lines = [f"@{name} = global i32 0" for name in WORDS] + ["@exited = global i8 0"]
-    pattern = r"^(?:\.visible )?\.(?:const|global) \.align (\d+) \.(\w+) ([\w.$]+)(?:\[(\d+)\])?(?: = (.*?))?;"
+    pattern = (
+        r"^(?:\.visible )?\.(?:const|global) \.align (\d+) \.(\w+) ([\w.$]+)"
+        r"(?:\[(\d+)\])?(?: = (.*?))?;"
+    )
     for align, kind, name, count, value in re.findall(pattern, ptx, re.M):
         n = int(count or 1)
         if value:
@@ -614,6 +613,9 @@ class Driver:
         return 0
 
     def cuCtxSetCurrent(self, _: Any) -> int:
+        return 0
+
+    def cuCtxSetLimit(self, *_: Any) -> int:
         return 0
 
     def cuModuleLoadDataEx(self, module: Any, image: Any, *_: Any) -> int:

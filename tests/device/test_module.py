@@ -31,7 +31,7 @@ def test_it_has_one_entry_and_calls_nothing_from_elsewhere(text):
     assert ".extern" not in text
     called = {*re.findall(r"call(?:\.uni)?\s+(?:\(\w+\), )?([\w$.]+)", text)}
     assert called <= {*re.findall(r"^\.func\s+(?:\([^)]*\) )?([\w$.]+)\(", text, re.MULTILINE)}
-    assert not re.search(r"call[^;]*%rd", text)  # the driver knows the stack that a thread needs
+    assert not re.search(r"call\.?\w*\s+(?:\(\w+\), )?%", text)  # and nothing by its address
 
 
 def test_each_operation_is_rounded_to_nearest_and_none_is_contracted(text):
@@ -39,6 +39,29 @@ def test_each_operation_is_rounded_to_nearest_and_none_is_contracted(text):
     floats = re.findall(r"\b((?:add|sub|mul|div|sqrt)\.[\w.]*f64)\b", text)
     assert {*floats} == {f"{name}.rn.f64" for name in ("add", "sub", "mul", "div", "sqrt")}
     assert not re.search(r"\b\w+\.(approx|ftz|full)\b|\.f32\b", text)
+
+
+def test_what_calls_in_circles_is_known(text):
+    """Else see whether ``cuda.STACK`` suffices."""
+    calls, name = {}, ""
+    for line in text.splitlines():
+        if found := re.match(r"(?:\.visible )?\.(?:func|entry)\s+(?:\([^)]*\) )?([\w$.]+)\(", line):
+            name = found[1]
+        elif found := re.match(r"\s+call\.uni (?:\(\w+\), )?([\w$.]+)", line):
+            calls.setdefault(name, set()).add(found[1])
+
+    def reached(start):
+        found, left = set(), [*calls.get(start, ())]
+        while left:
+            if (one := left.pop()) not in found:
+                found.add(one)
+                left += calls.get(one, ())
+        return found
+
+    circles = {one for one in calls if one in reached(one)}
+    # The merge sort does; kernels of places do not, but share a switch with what calls them.
+    known = ("argmergesort", "_place_kernels", "call_")
+    assert all(any(name in one for name in known) for one in circles)
 
 
 def test_it_names_no_file_of_the_machine_that_made_it(text):
@@ -52,7 +75,5 @@ def test_the_assembler_takes_it(text, tmp_path):
     (tmp_path / "kernels.ptx").write_text(text)
     command = [ptxas, "-v", "-O1", "-arch=sm_90", "-o", tmp_path / "out", tmp_path / "kernels.ptx"]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stderr
-    assert "recursi" not in said.lower()
-    assert "cannot be statically determined" not in said
     (constant,) = {int(size) for size in re.findall(r"(\d+) bytes cmem\[3\]", said)}
     assert constant <= 2**16

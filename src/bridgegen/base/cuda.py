@@ -25,6 +25,12 @@ PROCESSORS = 16  # of CUdevice_attribute
 
 OUT_OF_MEMORY = 2
 
+STACK_SIZE = 0  # of CUlimit
+STACK = 16_384
+"""Stack of a thread [bytes]. Numba's merge sort calls itself, and the switch over kernels of one
+signature looks as if they did, so the driver cannot know how much a thread needs, and would give it
+1,024."""
+
 
 class OutOfMemory(Exception):
     """The device has not as much memory."""
@@ -72,6 +78,7 @@ class Gpu:
         self._call("cuDevicePrimaryCtxRetain", byref(context), device)
         self._context = context
         self.enter()
+        self._call("cuCtxSetLimit", STACK_SIZE, c_size_t(STACK))
         self._module, log = c_void_p(), ctypes.create_string_buffer(LOG)
         options = (c_int * 2)(ERROR_LOG, ERROR_LOG_BYTES)
         values = (c_void_p * 2)(ctypes.addressof(log), LOG)
