@@ -147,8 +147,9 @@ class Conflicts:
 
     def take(self, at: Int) -> "Conflicts":
         """Return those of some rows."""
-        arrays = {item.name: getattr(self, item.name) for item in fields(self)}
-        return replace(self, **{n: a[at] for n, a in arrays.items() if isinstance(a, np.ndarray)})
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        some: dict[str, Any] = {n: v[at] for n, v in values.items() if isinstance(v, np.ndarray)}
+        return replace(self, **some)
 
     @cached_property
     def at_fault(self) -> Bool:
