@@ -183,16 +183,14 @@ def packed(bundle: NamedTuple, axes: int) -> npt.NDArray[np.uint8]:
     return np.concatenate([np.pad(part, ((0, 0), (0, -part.shape[1] % 8))) for part in parts], 1)
 
 
-def unpack(block: npt.NDArray[np.uint8], bundle: NamedTuple, rows: Int | slice) -> None:
-    """Fill some rows of arrays with the bytes ``(N, size)`` of those of a bundle."""
-    at = 0
+def views_of(block: npt.NDArray[np.uint8], bundle: Any) -> Any:
+    """Return arrays as those of a bundle, but of the rows whose bytes ``(N, size)`` are given."""
+    found, at = [], 0
     for value in bundle:
-        size = value[0].nbytes
-        found = np.ndarray(
-            value.shape, value.dtype, block, at, (block.shape[1], *value.strides[1:])
-        )
-        value[rows] = found[rows]
-        at += -(-size // 8) * 8
+        shape, strides = (len(block), *value.shape[1:]), (block.shape[1], *value.strides[1:])
+        found.append(np.ndarray(shape, value.dtype, block.data, at, strides))
+        at += -(-int(np.prod(shape[1:])) * value.itemsize // 8) * 8
+    return type(bundle)(*found)
 
 
 def template_of(states: memory.State) -> npt.NDArray[np.uint64]:
@@ -338,7 +336,6 @@ class Device:
     ) -> Found:
         n = len(networks)
         like = judging.found if judging else found_of(1)
-        found = Found(*(np.zeros((n, *array.shape[1:]), array.dtype) for array in like))
         keeps = judging is None
         tables = {
             "plan": table_of(plan, 0),
@@ -346,7 +343,7 @@ class Device:
             "state": table_of(states, 1, LANES),
             "record": table_of(records, 1, 1 if keeps else LANES),
             "given": table_of(given, 1),
-            "found": table_of(found, 1),
+            "found": table_of(like, 1),
         }
         if judging:
             tables |= {
@@ -391,12 +388,14 @@ class Device:
         self._gpu.launch(self._entry, blocks, THREADS)
         block = np.empty((n, sizes["found"]), np.uint8)
         self._gpu.get(block, job["found"])
-        unpack(block, found, slice(None))
+        found: Found = views_of(block, like)
         if keeps:
             block = np.empty((n, sizes["record"]), np.uint8)
             self._gpu.get(block, job["record"])
             done = found.done[:, 0] == 1
-            unpack(block, records, slice(None) if done.all() else np.flatnonzero(done))
+            rows = slice(None) if done.all() else np.flatnonzero(done)
+            for array, part in zip(records, views_of(block, records), strict=True):
+                array[rows] = part[rows]
         return found
 
     def _blocks(self, n: int, each: int) -> int:
