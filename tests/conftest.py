@@ -32,7 +32,7 @@ LONGEST = (
 )  # fmt: skip
 """Files that take some ten seconds of processor time or more: processes take them first."""
 
-EXAMPLES = 60
+EXAMPLES = 45
 """Examples that a property test draws, unless it states another number."""
 
 # No deadline: the first example may compile a kernel, and shared machines stall. The same examples

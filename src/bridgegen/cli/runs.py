@@ -386,6 +386,7 @@ def simulate(
     from bridgegen.cli.verdict.of_file import FileCriteria
     from bridgegen.drivers import split
     from bridgegen.engine.simulate import simulate_file
+    from bridgegen.openx.openscenario.tier4 import is_storyboard
     from bridgegen.simulation.trace import write_trace
 
     criteria = FileCriteria.read(fail_if or (), junit, criterion or ())
@@ -395,6 +396,7 @@ def simulate(
     is_logical = file.suffix.lower() in (".yaml", ".yml", ".osc") or not (
         file.suffix or file.exists()
     )
+    is_logical = is_logical and not is_storyboard(file)
     if is_logical or fix or distribution or odd:
         from bridgegen.jobs.search.model import simulate_scenario  # takes longer than a file
 

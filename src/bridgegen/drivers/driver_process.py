@@ -75,7 +75,8 @@ class DriverProcess:
         if not is_spec(spec):
             raise InputError(
                 "a driver is named package.module:Class, file.py:Class, file.fmu, "
-                f"connect:HOST:PORT, unix:PATH or exec:COMMAND; got '{spec}'"
+                "connect:HOST:PORT, unix:PATH, exec:COMMAND or egodriver://HOST:PORT; "
+                f"got '{spec}'"
             )
         self.spec = spec
         self.time_limit = time_limit
@@ -198,9 +199,9 @@ def make(spec: str) -> BatchDriver | CompiledDriver:
             function that is not a compiled driver, or that cannot be compiled.
     """
     if spec.endswith(".fmu"):
-        from bridgegen.drivers.fmu import FmuDriver
+        from bridgegen.drivers.fmu import fmu_driver
 
-        return FmuDriver(spec)
+        return fmu_driver(spec)
     where, _, name = spec.rpartition(":")
     try:
         # In the driver's own process. Only what a person has typed comes here: a name in a file or

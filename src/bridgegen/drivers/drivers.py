@@ -233,7 +233,8 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
     Args:
         name: of one that ships, of a planner, or a user's own: ``package.module:Class``,
             ``file.py:Class`` (or a compiled driver's function), ``file.fmu``; or where it runs,
-            as ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``. It is loaded when it drives.
+            as ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``, ``egodriver://HOST:PORT``. It
+            is loaded when it drives.
             One that ships may end in one of `MANOEUVRES`; a user's class or function and a planner
             in ``@FILE.yaml``, see `bridgegen.drivers.tunable`.
         ideal: stages to idealise.

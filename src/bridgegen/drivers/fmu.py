@@ -1,5 +1,7 @@
 """A co-simulation unit (FMI 2.0 or 3.0) as a driver, one instance per scenario.
 
+One that is a traffic participant of OSMP is `bridgegen.drivers.osmp`'s.
+
 Needs the extra ``fmi``. The inputs that the unit has are set by name:
 
 - ``x y h v a target_speed offset stop_distance light`` as in `Observation`; ``stop_distance`` is
@@ -24,7 +26,7 @@ import numpy as np
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.base.extras import require
-from bridgegen.drivers.interface import ROUTE_POINTS, Control, Observation, Scene
+from bridgegen.drivers.interface import ROUTE_POINTS, Control, Observation, Scene, Trajectory
 
 TRACK = (
     "state",
@@ -60,11 +62,10 @@ class FmuDriver:
     """
 
     def __init__(self, path: Path | str) -> None:
-        require("fmi", "a driver in a .fmu")
+        self._description = _described(path)
         import fmpy
 
         try:
-            self._description = fmpy.read_model_description(str(path), validate=False)
             self._folder = fmpy.extract(str(path))
         except Exception as error:
             raise FileFormatError(f"{path}: not a co-simulation unit: {error}") from None
@@ -74,6 +75,12 @@ class FmuDriver:
                 f"{path}: a co-simulation unit of FMI 2.0 or 3.0 is needed, got FMI "
                 f"{about.fmiVersion}{'' if about.coSimulation else ' without co-simulation'}"
             )
+        self._units: list[Any] = []
+        self._bind(path)
+
+    def _bind(self, path: Path | str) -> None:
+        """Find the inputs and outputs that the unit has; raise `InputError`."""
+        about = self._description
         self._inputs = {
             variable.name: variable.valueReference
             for variable in about.modelVariables
@@ -94,7 +101,6 @@ class FmuDriver:
             problems.append(f"{path}: it must have an output named acceleration or curvature")
         if problems:
             raise InputError(*problems)
-        self._units: list[Any] = []
 
     def reset(self, n: int, scene: Scene) -> None:
         """See `BatchDriver`."""
@@ -102,7 +108,7 @@ class FmuDriver:
         self._free()
         self._units = [self._instance(i) for i in range(n)]
 
-    def act(self, observation: Observation) -> Control:
+    def act(self, observation: Observation) -> Control | Trajectory:
         """See `BatchDriver`."""
         n = len(observation.x)
         given = np.array([_values(observation, name) for name in self._inputs]).reshape(-1, n)
@@ -142,14 +148,42 @@ class FmuDriver:
         if is_two:
             unit.setupExperiment(startTime=0.0)
         unit.enterInitializationMode()
+        self._initialise(unit, number)
         unit.exitInitializationMode()
         return unit
+
+    def _initialise(self, unit: Any, number: int) -> None:
+        """Set the parameters of the unit of a scenario."""
 
     def _free(self) -> None:
         for unit in getattr(self, "_units", ()):
             unit.terminate()
             unit.freeInstance()
         self._units = []
+
+
+def fmu_driver(path: Path | str) -> FmuDriver:
+    """Return the driver that a unit is: by messages of OSI if it gives one, else by numbers.
+
+    Raises:
+        InputError: the extra is missing, or an input or output is unknown or missing.
+        FileFormatError: not a co-simulation unit of FMI 2.0 or 3.0.
+    """
+    from bridgegen.drivers.osmp import UPDATE, OsmpDriver
+
+    names = [variable.name for variable in _described(path).modelVariables]
+    return (OsmpDriver if any(name.startswith(UPDATE) for name in names) else FmuDriver)(path)
+
+
+def _described(path: Path | str) -> Any:
+    """Return a unit's description."""
+    require("fmi", "a driver in a .fmu")
+    import fmpy
+
+    try:
+        return fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:
+        raise FileFormatError(f"{path}: not a co-simulation unit: {error}") from None
 
 
 def _is_known(name: str) -> bool:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.scenario.participants import OBJECT_CLASSES
+from bridgegen.scenario.participants import OBJECT_CLASSES, PARTICIPANTS
 
 NAMES = tuple(object_class.name for object_class in OBJECT_CLASSES)
 """Names of the object classes, by code."""
@@ -104,6 +104,10 @@ HIDES_PEOPLE = tuple(object_class.hides_people for object_class in OBJECT_CLASSE
 LAMPS = tuple(object_class.lamps for object_class in OBJECT_CLASSES)
 """Luminous intensity of the lamps that each kind shows [cd]; UN R7 asks 4 of each of two rear
 lamps."""
+
+_BODIES = {kind.seen_as.name: kind.body for kind in reversed([*PARTICIPANTS.values()])}
+HEIGHTS = tuple(_BODIES[name].height for name in NAMES)
+"""Height of each kind's usual body [m], by code."""
 
 REFLECTANCE = tuple(object_class.reflectance for object_class in OBJECT_CLASSES)
 """Reflectance of each kind at 905 nm: dark clothes 0.1; with plates and reflectors, vehicles

@@ -33,6 +33,7 @@ from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.pruning import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.openx.openscenario.stated_criteria import stated_criteria
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.openx.prepared import prepared, roads_of
 from bridgegen.scenario.language.criteria import Criterion, joined
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
@@ -134,7 +135,7 @@ def simulate_file(
         UnknownNameError: no such driver, vehicle, stage, metric or reading of empty triggers.
     """
     path = Path(path)
-    if path.suffix.lower() in (".yaml", ".yml", ".osc"):
+    if path.suffix.lower() in (".yaml", ".yml", ".osc") and not is_storyboard(path):
         raise FileFormatError(
             f"{path}: one OpenSCENARIO file (.xosc) is simulated; a YAML file describes many "
             f"scenarios, of which 'bridgegen simulate' and bridgegen.model simulate one"

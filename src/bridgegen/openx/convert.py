@@ -7,7 +7,7 @@ from bridgegen.base.errors import InputError, StorageError
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import write as opendrive_write
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
-from bridgegen.openx.opendrive.road_map import digest_of, map_path
+from bridgegen.openx.opendrive.road_map import digest_of, map_bytes, map_path
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.opendrive.to_owl.network import losses
 from bridgegen.openx.openscenario import read as openscenario_read
@@ -15,9 +15,9 @@ from bridgegen.openx.openscenario import write as openscenario_write
 from bridgegen.openx.openscenario.from_owl.scenario import openscenario_from_owl
 from bridgegen.openx.openscenario.parameters import EGO, ego_of, rename_entity
 from bridgegen.openx.openscenario.pruning import NEVER, read_empty_triggers
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.prepared import logic_path, prepared, roads_of
-from bridgegen.openx.xml import read_bytes
 from bridgegen.scenario.language.reader import entry_names, pack_names
 from bridgegen.scenario.language.reader import load as load_scenario
 from bridgegen.scenario.language.reader import names as scenario_names
@@ -64,7 +64,7 @@ def road_bytes(individuals: Individuals, beside: Path) -> bytes:
     map_file = individuals.optional_text(network, "has_map_file")
     if map_file is None:
         return opendrive_write.to_xml(opendrive_from_owl(individuals))
-    return read_bytes(beside / map_file)
+    return map_bytes(beside / map_file)
 
 
 def import_file(
@@ -104,7 +104,7 @@ def import_file(
     named, file = file, map_path(file)
     out = out or (file if file == named else Path(named.name)).with_suffix(".owl")
     notes: list[str] = []
-    if file.suffix.lower() == ".xosc":
+    if is_storyboard(file):
         individuals, notes = _import_storyboard(file, out, partial, ego, strict, empty_trigger)
     elif partial or strict or ego is not None or empty_trigger != NEVER:
         raise InputError(
@@ -112,7 +112,7 @@ def import_file(
             "or triggers"
         )
     else:
-        data = read_bytes(file)
+        data = map_bytes(file, notes)
         model = opendrive_read.read(data, str(file), notes)
         individuals = individuals_from_opendrive(model, _seen_from(out, file), digest_of(data))
         notes += losses(model)

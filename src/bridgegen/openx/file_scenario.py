@@ -19,6 +19,7 @@ from bridgegen.base.errors import FileFormatError, InputError, ScenarioError
 from bridgegen.openx.opendrive.mirror import as_written, right_hand
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
+from bridgegen.openx.opendrive.road_map import as_opendrive, map_bytes
 from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters, validate
@@ -34,7 +35,6 @@ from bridgegen.openx.openscenario.stated_criteria import stated_criteria
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.values import Kind, format_double
 from bridgegen.openx.prepared import logic_path, prepared
-from bridgegen.openx.xml import read_bytes
 from bridgegen.scenario.language.constraints import Constraints
 from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.objectives import HARM
@@ -278,9 +278,9 @@ def _roads_of(path: Path, storyboard: osc.OpenScenario, known: dict[Path, RoadFi
     """
     road = logic_path(storyboard, path)
     if road not in known:
-        data = read_bytes(road)
+        data = map_bytes(road)
         known[road] = RoadFile(
-            road.name,
+            as_opendrive(road).name,
             hashlib.sha256(data).hexdigest(),
             data,
             right_hand(read_roads(data, str(road), may_be_empty=True), str(road)),

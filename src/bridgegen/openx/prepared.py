@@ -13,7 +13,7 @@ from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive.lanes import section_end, section_index
 from bridgegen.openx.opendrive.mirror import as_written, right_hand
 from bridgegen.openx.opendrive.model import Header, OpenDrive
-from bridgegen.openx.opendrive.road_map import map_path
+from bridgegen.openx.opendrive.road_map import map_bytes, map_path
 from bridgegen.openx.opendrive.routes import Stretch, next_stretches
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
@@ -38,7 +38,8 @@ def roads_of(scenario: OpenScenario, path: Path) -> OpenDrive:
     if scenario.road_network.logic_file is None:
         return OpenDrive(Header(1, 7))
     road = logic_path(scenario, path)
-    return right_hand(opendrive_read.read(road, may_be_empty=True), str(road))
+    model = opendrive_read.read(map_bytes(road), str(road), may_be_empty=True)
+    return right_hand(model, str(road))
 
 
 def logic_path(scenario: OpenScenario, path: Path) -> Path:

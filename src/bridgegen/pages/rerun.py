@@ -17,10 +17,11 @@ from bridgegen.assess.criteria.signals import read
 from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
 from bridgegen.drivers import kinds
+from bridgegen.drivers.osi import REACH
 from bridgegen.engine.simulate import FileResult
 from bridgegen.openx.opendrive.mirror import as_written
 from bridgegen.openx.opendrive.outline import LINES, lights, outline
-from bridgegen.simulation.osi.trace import REACH, height_of
+from bridgegen.simulation.osi.trace import height_of
 from bridgegen.simulation.rollout import Rollout
 
 TIME, TO_CONFLICT = "time", "to the conflict"

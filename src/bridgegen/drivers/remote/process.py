@@ -9,8 +9,9 @@ from typing import Any
 
 from bridgegen.base.errors import InputError
 from bridgegen.base.processes.isolated import Answer, CallError
-from bridgegen.drivers.address import Command, address_of
+from bridgegen.drivers.address import Command, Grpc, address_of
 from bridgegen.drivers.interface import BatchDriver, Control, Observation, Scene, Trajectory
+from bridgegen.drivers.remote.egodriver import Calls, Egodriver
 from bridgegen.drivers.remote.messages import (
     NONSENSE,
     PROTOCOL,
@@ -22,7 +23,7 @@ from bridgegen.drivers.remote.messages import (
     pack_json,
     unpack,
 )
-from bridgegen.drivers.remote.wire import ClosedError, Wire, connected
+from bridgegen.drivers.remote.wire import ClosedError, Wire, connected, one_line
 from bridgegen.drivers.user_drivers import NAMES, Traits
 from bridgegen.drivers.views import MapSender
 
@@ -34,9 +35,6 @@ AGAIN_SECONDS = 10.0
 
 MAX_ITEMS = 1024
 """Largest number of elements of the lists and maps of an answer."""
-
-MAX_MESSAGE = 500
-"""Largest number of characters of an error message that is passed on."""
 
 _PAUSE = 0.1
 _TRAJECTORY = ("time", "x", "y", "h", "v")
@@ -92,7 +90,7 @@ class RemoteProcess:
     """A driver in another process and language; its like in Python is `isolated.IsolatedProcess`.
 
     Args:
-        spec: ``connect:HOST:PORT``, ``unix:PATH`` or ``exec:COMMAND``.
+        spec: ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``, ``egodriver://HOST:PORT``.
         error: is raised if a call is not answered.
         answering: returns what a driver says of itself, and the function that answers requests.
 
@@ -108,7 +106,7 @@ class RemoteProcess:
     ) -> None:
         self._spec, self._error, self._answering = spec, error, answering
         self._address = address_of(spec)
-        self._wire: Wire | None = None
+        self._wire: Wire | Calls | None = None
         self._was_there = False
 
     @property
@@ -126,13 +124,9 @@ class RemoteProcess:
             InputError: it cannot be reached, or it does not speak this protocol.
         """
         is_command = isinstance(self._address, Command)
-        hello = {"type": "hello", "protocol": PROTOCOL, "software": _software()}
         try:
             self._wire = self._connected()
-            said = exchange(self._wire, hello, seconds, self._error)
-            _expect("hello", said)
-            _refuse_version(said)
-            self._driver = RemoteDriver(self._wire, said, self._error)
+            self._driver = self._greeted(self._wire, seconds)
             traits, self._answer = self._answering(self._driver)
         except (CallError, InputError, ProtocolError) as error:
             self.close()
@@ -171,16 +165,28 @@ class RemoteProcess:
         if self._wire is not None:
             self._wire.close()
 
-    def _connected(self) -> Wire:
+    def _connected(self) -> Wire | Calls:
         """Connect; wait a little for a server that has been there."""
         deadline = time.monotonic() + AGAIN_SECONDS
         while True:
             try:
+                if isinstance(self._address, Grpc):
+                    return Calls(self._address, self._error)
                 return connected(self._address)
             except InputError:
                 if not self._was_there or time.monotonic() > deadline:
                     raise
             time.sleep(_PAUSE)
+
+    def _greeted(self, wire: Wire | Calls, seconds: float) -> RemoteDriver | Egodriver:
+        """Greet a driver that has just been connected to; return it."""
+        if isinstance(wire, Calls):
+            return Egodriver(wire, seconds)
+        hello = {"type": "hello", "protocol": PROTOCOL, "software": _software()}
+        said = exchange(wire, hello, seconds, self._error)
+        _expect("hello", said)
+        _refuse_version(said)
+        return RemoteDriver(wire, said, self._error)
 
 
 def exchange(wire: Wire, message: Message, seconds: float, error: type[CallError]) -> Message:
@@ -213,7 +219,7 @@ def exchange(wire: Wire, message: Message, seconds: float, error: type[CallError
         raise
     if answer["type"] == "error":
         kind = NONSENSE if answer.get("kind") == NONSENSE else RAISED
-        raise error(kind, _line(str(answer.get("message", ""))))
+        raise error(kind, one_line(str(answer.get("message", ""))))
     return answer
 
 
@@ -268,11 +274,4 @@ def _array(answer: Message, name: str) -> Any:
 
 
 def _short(value: Any) -> str:
-    return _line(repr(value))[:80]
-
-
-def _line(text: str) -> str:
-    """Return a text from elsewhere as one line without control characters."""
-    # A text from another program must not steer a terminal, nor fill a report.
-    shown = "".join(name if name.isprintable() else " " for name in text[:MAX_MESSAGE])
-    return " ".join(shown.split())
+    return one_line(repr(value))[:80]

@@ -23,6 +23,9 @@ CONNECT_SECONDS = 10.0
 END_SECONDS = 2.0
 """Time for a program to end by itself after its standard output [s]."""
 
+MAX_TEXT = 500
+"""Largest number of characters of a text from elsewhere that is passed on."""
+
 _PART = 2**14  # bytes to read at least: what a control of some hundred rows has
 _SET_PIPE_SIZE = 1031  # F_SETPIPE_SZ of Linux
 
@@ -147,13 +150,13 @@ def connected(address: Address) -> Wire:
         connection = _socket(address)
     except TimeoutError:
         raise InputError(
-            f"{_named(address)} accepts no connection within {CONNECT_SECONDS:g} s"
+            f"{named(address)} accepts no connection within {CONNECT_SECONDS:g} s"
         ) from None
     except ConnectionRefusedError:
-        raise InputError(f"nobody listens on {_named(address)}") from None
+        raise InputError(f"nobody listens on {named(address)}") from None
     except (OSError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{_named(address)} cannot be reached: {reason}") from None
+        raise InputError(f"{named(address)} cannot be reached: {reason}") from None
 
     def kill() -> None:
         with suppress(OSError):
@@ -184,10 +187,18 @@ def _socket(address: Tcp | Unix) -> socket.socket:
     return connection
 
 
-def _named(address: Tcp | Unix) -> str:
+def named(address: Tcp | Unix) -> str:
+    """Return where a server is, in words."""
     if isinstance(address, Tcp):
         return f"port {address.port} of {address.host}"
     return f"the unix socket {address.path}"
+
+
+def one_line(text: str) -> str:
+    """Return a text from elsewhere as one line without control characters."""
+    # A text from another program must not steer a terminal, nor fill a report.
+    shown = "".join(name if name.isprintable() else " " for name in text[:MAX_TEXT])
+    return " ".join(shown.split())
 
 
 def _started(command: Command) -> Wire:

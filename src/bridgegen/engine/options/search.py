@@ -62,7 +62,7 @@ class PipelineOptions(Declared):
             TEXT,
             "Driver of the ego, see 'bridgegen list drivers'; or your own: module:Class, "
             "file.py:Class (or :function, compiled), file.fmu, connect:HOST:PORT, unix:PATH, "
-            "'exec:COMMAND'.",
+            "'exec:COMMAND', egodriver://HOST:PORT.",
             shown="the scenario's choice",
             group=OF_DRIVER,
             names="driver",
@@ -224,7 +224,7 @@ class CommonOptions(PipelineOptions):
         default=None,
         metadata=option(
             PATH,
-            "Map to search on: .xodr, or the .owl that it was imported as.",
+            "Map to search on: .xodr, .osm, or the .owl that it was imported as.",
             spelling="--map",
             shown="the scenario's roads",
         ),

@@ -35,6 +35,7 @@ from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.recorded import Recording, recorded
 from bridgegen.openx.openscenario.resolve import resolved
 from bridgegen.openx.openscenario.scenario_runner.convert import CONTROL, for_scenario_runner
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.openx.openscenario.write import VERSIONS, least_version, to_version, to_xml
 from bridgegen.openx.prepared import logic_path, prepared, roads_of
 from bridgegen.openx.xml import read_bytes
@@ -96,9 +97,9 @@ def export(
     if town is not None and not _LEVEL.fullmatch(town):
         raise InputError(f"a town must be the name of one of CARLA's maps, got '{town}'")
     paths = _chosen(source, scenarios)
-    if flavour == CARLA and town is None and source.suffix.lower() != ".xosc":
+    if flavour == CARLA and town is None and not is_storyboard(source):
         town = _town_of(source)
-    base = source.parent if source.suffix.lower() == ".xosc" else source
+    base = source.parent if is_storyboard(source) else source
     folder = out or base / EXPORT / flavour
     found = []
     for path in paths:
@@ -139,7 +140,7 @@ def export_traces(
             too large or of no known format.
     """
     traces: Iterable[tuple[str, Rollout, Surroundings]]
-    if source.is_dir() or source.suffix.lower() == ".xosc":
+    if source.is_dir() or is_storyboard(source):
         chosen = _chosen(source, scenarios)
         results = ((path.stem, _simulated(path, ego)) for path in chosen)
         traces = ((name, result.rollout, result.around()) for name, result in results)
@@ -283,7 +284,7 @@ def _town_of(run: Path) -> str | None:
 
 def _chosen(source: Path, scenarios: Sequence[str]) -> list[Path]:
     """Return the files to export, in the order of their names."""
-    if source.suffix.lower() == ".xosc":
+    if is_storyboard(source):
         if scenarios:
             raise InputError(f"{source}: scenarios are chosen of a run; this is one scenario")
         return [source]

@@ -11,10 +11,9 @@ from bridgegen.openx.opendrive.mirror import as_written, right_hand
 from bridgegen.openx.opendrive.model import Junction, OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.rings import Ring, rings
-from bridgegen.openx.opendrive.road_map import RoadMap, map_of, map_path
+from bridgegen.openx.opendrive.road_map import RoadMap, as_opendrive, map_bytes, map_of, map_path
 from bridgegen.openx.opendrive.site import road_ends, stretches
 from bridgegen.openx.opendrive.site_fit import candidates, kind_of_place, missing, sites_at
-from bridgegen.openx.xml import read_bytes
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.ontology.site import Site
 
@@ -64,9 +63,10 @@ def places_of(
     path = map_path(path)
     if path.suffix.lower() == ".owl":
         path, _ = map_of(path)
-    data = read_bytes(path)
     warnings: list[str] = []
+    data = map_bytes(path, warnings)
     model = right_hand(read(data, str(path), warnings), str(path))
+    path = as_opendrive(path)
     found: list[PlaceFit] = []
     wanted = None if scenario is None else kind_of_place(scenario)
     if wanted in (None, "junction"):

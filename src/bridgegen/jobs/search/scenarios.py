@@ -15,6 +15,7 @@ from bridgegen.engine.options.forms import read_names
 from bridgegen.openx.file_scenario import FileScenario, load_file_scenario, with_triggers
 from bridgegen.openx.file_scenario import with_others as drive_file_by
 from bridgegen.openx.openscenario.parameters import values
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.scenario.language import reader
 from bridgegen.scenario.language.adversary import require, with_others
 from bridgegen.scenario.language.criteria import PREFIX, joined, read_criterion
@@ -55,7 +56,7 @@ def load(
         InputError: a distribution, or that reading, for another kind of scenario; or as the
             readers say.
     """
-    if Path(scenario).suffix.lower() == STORYBOARD:
+    if is_storyboard(scenario):
         found = load_file_scenario(Path(scenario), Path(distribution) if distribution else None)
         return found if empty_trigger is None else with_triggers(found, empty_trigger)
     if empty_trigger is not None:

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from bridgegen.base.errors import BridgeGenError, InputError, UnsupportedError
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
+from bridgegen.openx.opendrive.road_map import map_bytes
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.scenario.ontology import reasoner
 from bridgegen.scenario.ontology.graph import Individuals
 
@@ -29,7 +31,7 @@ PLACEHOLDERS = (
 def validate_file(
     path: Path, *, reason: bool = False, warnings: list[str] | None = None
 ) -> list[str]:
-    """Return the problems of an ``.owl``, ``.xodr``, ``.osc``, ``.xosc`` or ``.yaml`` file.
+    """Return the problems of a file: ``.owl``, ``.xodr``, ``.osm``, ``.osc``, ``.xosc``, ``.yaml``.
 
     An ``.owl`` of a scenario of the catalogue is checked against that scenario's constraints. An
     ``.xosc`` is checked with the map that it names, one with a distribution with its scenario. A
@@ -51,6 +53,7 @@ def validate_file(
     kinds = {
         ".owl": _ontology,
         ".xodr": lambda file: _roads(file, warnings),
+        ".osm": lambda file: _roads(file, warnings),
         ".osc": lambda file: _dsl(file, warnings),
         ".xosc": lambda file: _storyboard(file, warnings),
         ".yaml": _logical,
@@ -58,8 +61,9 @@ def validate_file(
     }
     if path.suffix.lower() not in kinds:
         raise InputError(f"{path}: the file's name must end in {', '.join(kinds)}")
+    kind = ".xosc" if is_storyboard(path) else path.suffix.lower()
     try:
-        found = kinds[path.suffix.lower()](path)
+        found = kinds[kind](path)
         if reason and path.suffix.lower() == ".owl":
             found += reasoner.reason(path).problems
         return [_placed(path, problem) for problem in found]
@@ -73,7 +77,7 @@ def notes_on(path: Path) -> list[str]:
     That its name is not the scenario's, that texts of the template still stand in it, and that a
     participant indicates to one side only and changes lane to the other only.
     """
-    if path.suffix.lower() not in (".yaml", ".yml", ".osc"):
+    if path.suffix.lower() not in (".yaml", ".yml", ".osc") or is_storyboard(path):
         return []
     from bridgegen.scenario.exposure.reader import is_exposure
     from bridgegen.scenario.language.reader import load as load_scenario
@@ -144,7 +148,7 @@ def _is_mined(individuals: Individuals) -> bool:
 
 def _roads(path: Path, warnings: list[str] | None) -> list[str]:
     odd: list[str] = []
-    model = opendrive_read.read(path, warnings=odd)
+    model = opendrive_read.read(map_bytes(path, odd), str(path), odd)
     odd += [_placed(path, problem) for problem in opendrive_validate.problems(model)]
     if warnings is None:
         return odd

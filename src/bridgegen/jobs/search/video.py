@@ -9,7 +9,8 @@ from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.jobs.search.run import Run
-from bridgegen.jobs.search.scenarios import STORYBOARD, load
+from bridgegen.jobs.search.scenarios import load
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.pages.data import WHOLE
 from bridgegen.pages.playback import Playback
 from bridgegen.pages.playbacks import nominal_playback, playbacks
@@ -48,7 +49,7 @@ def film(
     check_look(size, fps)
     if out is not None:
         refuse_path(out)
-    if source.suffix.lower() == STORYBOARD:
+    if is_storyboard(source):
         if evaluation is not None:
             raise InputError(f"{source}: is one scenario: --evaluation is for a run")
         out = out or Path(f"{source.stem}.gif")

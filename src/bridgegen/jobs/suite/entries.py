@@ -10,6 +10,7 @@ from typing import Any, Literal
 from bridgegen.base.errors import BridgeGenError, InputError
 from bridgegen.jobs.suite.rows import NO_MATRIX
 from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.results.failures import FailureFile, failure_of
 from bridgegen.scenario.language.parameters import nearest
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES
@@ -57,7 +58,7 @@ class Entry:
         """A digest of its files, their map and catalogues; empty if they cannot be read."""
         made = hashlib.sha256()
         try:
-            if not self.scenario.lower().endswith(_STORYBOARD):
+            if not is_storyboard(self.scenario):
                 return load(self.scenario).fingerprint
             if self.criteria or self.count:
                 made.update(json.dumps([self.criteria, self.count], sort_keys=True).encode())
@@ -163,7 +164,7 @@ def of_edition(entries: Sequence[Entry], edition: str | None) -> tuple[Entry, ..
 
 def _editions(entry: Entry) -> set[str]:
     """Return the editions of an entry's matrix; none if it has no matrix, or cannot be read."""
-    if entry.scenario.lower().endswith(_STORYBOARD):
+    if is_storyboard(entry.scenario):
         return set()
     try:
         return {grid.edition for grid in load(entry.scenario).matrix}
@@ -194,14 +195,14 @@ def _files(folder: Path) -> Iterable[Path]:
 
 def _entry(path: Path) -> Entry | None:
     """Return the entry of a file; None if it is none."""
-    if path.suffix.lower() in (*_YAML, DSL):
+    if path.suffix.lower() in (*_YAML, DSL) and not is_storyboard(path):
         with path.open("rb") as file:
             head = file.read(MAX_BYTES)
         # Of DSL, files with declarations alone are imported by others.
         key = b"scenario " if path.suffix.lower() == DSL else b"scenario:"
         is_scenario = any(line.startswith(key) for line in head.splitlines())
         return Entry(path.stem, str(path)) if is_scenario else None
-    if path.suffix.lower() != _STORYBOARD:
+    if not is_storyboard(path):
         return None
     kind, named, problem = kind_of_file(path)
     if problem:

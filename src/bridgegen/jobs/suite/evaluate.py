@@ -23,6 +23,7 @@ from bridgegen.jobs.suite.results import EntryResult, GridResult, RowResult, fin
 from bridgegen.jobs.suite.rows import Rows, is_sample, rows_of
 from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.openx.openscenario.ranges import FileParameter
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.scenario.language.parameters import Parameter
 from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.scenario.language.space import SearchSpace
@@ -114,7 +115,7 @@ def scenario_of(job: Job) -> SearchedScenario:
         InputError: the files cannot be read, or nothing of it lies in that domain.
     """
     entry = job.entry
-    is_file = entry.scenario.lower().endswith(".xosc")
+    is_file = is_storyboard(entry.scenario)
     trigger = job.options.empty_trigger if is_file else None
     scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
     return within(scenario, job.options.odd)

@@ -25,6 +25,7 @@ from bridgegen.jobs.suite.results import EntryResult
 from bridgegen.jobs.suite.suite import read_suite
 from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.openx.openscenario.declarations import CAUSE
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.results.store.run_file import FILE as RUN_FILE
 from bridgegen.scenario.language.criteria import PREFIX
 from bridgegen.search.triage.modes import Key, keys_of, title
@@ -346,7 +347,7 @@ def _of_rows(job: Job, result: EntryResult, source: str) -> Iterator[Failing | N
         if way.problem:
             yield NotFailing(where, way.problem)
             continue
-        is_file = job.entry.scenario.lower().endswith(".xosc")
+        is_file = is_storyboard(job.entry.scenario)
         yield Failing(
             where,
             replace(job, only=failed[k]),

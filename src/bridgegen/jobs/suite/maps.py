@@ -17,6 +17,7 @@ from bridgegen.jobs.preventability.preventability import map_preventability
 from bridgegen.jobs.preventability.result import PreventabilityMap
 from bridgegen.jobs.search.scenarios import driven_by, load, within
 from bridgegen.jobs.suite.suite import SuiteRun
+from bridgegen.openx.openscenario.tier4 import is_storyboard
 from bridgegen.scenario.language.scenario import LogicalScenario
 
 MOST_CELLS = 20_000
@@ -48,7 +49,7 @@ def map_suite(
     """
     found = []
     for name in dict.fromkeys(job.entry.scenario for job in suite.jobs if not job.entry.problem):
-        if name.lower().endswith(".xosc"):
+        if is_storyboard(name):
             continue
         others = suite.settings["others"]
         odd = suite.settings.get("odd")

@@ -58,13 +58,31 @@ def map_path(path: Path) -> Path:
     raise FileFormatError(f"{rule} in {root} (--maps, or {ROOT})")
 
 
+def map_bytes(path: Path, warnings: list[str] | None = None) -> bytes:
+    """Return a map as OpenDRIVE: its own bytes, or those that a Lanelet2 map (``.osm``) becomes.
+
+    Args:
+        path: an OpenDRIVE file, or a Lanelet2 map.
+        warnings: takes a sentence for each kind of thing that OpenDRIVE does not get.
+
+    Raises:
+        FileFormatError: it cannot be read; a Lanelet2 map that cannot be.
+    """
+    data = read_bytes(path)
+    if path.suffix.lower() != ".osm":
+        return data
+    from bridgegen.openx.lanelet2.convert import opendrive_of
+
+    return opendrive_of(data, str(path), warnings)
+
+
 @dataclass(frozen=True)
 class RoadMap:
     """An OpenDRIVE file and where on it scenarios take place.
 
     Attributes:
-        path: of the file.
-        data: its bytes, exported unchanged.
+        path: of the file; with the ending of OpenDRIVE.
+        data: of OpenDRIVE, exported unchanged.
         model: its contents, mirrored where traffic drives on the left.
         site: the junction or the stretch of road.
         warnings: what was not read as it stands.
@@ -110,7 +128,8 @@ def load_map(
     digest = ""
     if owl is not None:
         path, digest = map_of(owl)
-    data = read_bytes(path) if owl is None else _read_named(path, owl)
+    warnings: list[str] = []
+    data = map_bytes(path, warnings) if owl is None else _read_named(path, owl, warnings)
     # The individuals hold neither elevations nor the course of cubics; these are in the map alone.
     # A scenario that is searched on the ontology takes place on exactly the file it was made of.
     if owl is not None and digest_of(data) != digest:
@@ -118,8 +137,8 @@ def load_map(
             f"{owl}: its map {path} must be what it was when it was imported, but has changed; "
             "import it again"
         )
-    warnings: list[str] = []
     model = right_hand(read(data, str(path), warnings), str(path))
+    path = as_opendrive(path)
     sites: list[Site] = []
     others: list[Site] = []
     if scenario is not None and junction == ALL:
@@ -169,9 +188,14 @@ def digest_of(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _read_named(path: Path, owl: Path) -> bytes:
+def as_opendrive(path: Path) -> Path:
+    """Return the name of a map when it is exported: of a Lanelet2 map, that of its OpenDRIVE."""
+    return path.with_suffix(".xodr") if path.suffix.lower() == ".osm" else path
+
+
+def _read_named(path: Path, owl: Path, warnings: list[str]) -> bytes:
     try:
-        return read_bytes(path)
+        return map_bytes(path, warnings)
     except FileFormatError as error:
         raise FileFormatError(
             *(f"{owl}: its map must be there beside it: {problem}" for problem in error.problems)

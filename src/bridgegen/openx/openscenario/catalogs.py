@@ -21,6 +21,7 @@ from bridgegen.openx.openscenario.environment import Environment
 from bridgegen.openx.openscenario.positions import Route, Trajectory
 from bridgegen.openx.openscenario.reader import element_of
 from bridgegen.openx.openscenario.storyboard import Maneuver
+from bridgegen.openx.openscenario.tier4 import is_storyboard, root_of
 from bridgegen.openx.xml import MAX_BYTES, parse_xml, read_bytes
 
 MAX_FILES = 1000
@@ -132,7 +133,8 @@ class Catalogs:
         if path not in self._roots:
             data = read_bytes(path, limit=MAX_BYTES - self._bytes)  # of all of them together
             self._bytes += len(data)
-            self._roots[path] = parse_xml(data, str(path))
+            is_xml = path.suffix.lower() == ".xosc"
+            self._roots[path] = parse_xml(data, str(path)) if is_xml else root_of(path)
         return self._roots[path]
 
     def _read(self, node: etree._Element, cls: type[Element], file: str) -> Element:
@@ -164,7 +166,7 @@ def _files(folder: Path, catalog: str) -> Iterator[Path]:
         found = [
             path
             for path in sorted(paths, key=lambda path: (path.stem != catalog, path.name))
-            if path.suffix.lower() == ".xosc" and stat.S_ISREG(path.stat().st_mode)
+            if stat.S_ISREG(path.stat().st_mode) and is_storyboard(path)
         ]
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)

@@ -5,7 +5,7 @@ from typing import Literal
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.openscenario.read import DISTRIBUTION
-from bridgegen.openx.xml import parse_xml
+from bridgegen.openx.openscenario.tier4 import root_of
 
 _PATHS = ("path", "filepath")
 """Attributes that name files and folders."""
@@ -22,10 +22,13 @@ def files_named_in(path: Path) -> tuple[Path, ...]:
         FileFormatError: it cannot be read.
     """
     found: dict[Path, None] = {}
-    for element in parse_xml(path).iter():
+    for element in root_of(path).iter():
         for name, value in element.attrib.items():
             text = str(value)
-            if not (str(name) in _PATHS or text.lower().endswith(".xodr")) or "\0" in text:
+            if (
+                not (str(name) in _PATHS or text.lower().endswith((".xodr", ".osm")))
+                or "\0" in text
+            ):
                 continue
             named = path.parent / text
             some = sorted(named.glob("*.xosc")) if named.is_dir() else [named]
@@ -41,7 +44,7 @@ def kind_of_file(path: Path) -> tuple[Kind, str, str]:
         file, empty if it is well-formed.
     """
     try:
-        root = parse_xml(path)
+        root = root_of(path)
     except FileFormatError as error:
         return "other", "", "; ".join(error.problems)
     if root.find("Storyboard") is not None:

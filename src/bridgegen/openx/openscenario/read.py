@@ -13,6 +13,7 @@ from bridgegen.openx.openscenario.expand import expanded
 from bridgegen.openx.openscenario.pruning import strays, without
 from bridgegen.openx.openscenario.reader import element_of, shorten
 from bridgegen.openx.openscenario.storyboard import OpenScenario
+from bridgegen.openx.openscenario.tier4 import root_of
 from bridgegen.openx.openscenario.write import fill
 from bridgegen.openx.xml import parse_xml
 
@@ -55,7 +56,7 @@ def read(
     """
     path = Path(source) if isinstance(source, str) else source
     place = place or (str(path) if isinstance(path, Path) else "document")
-    root = parse_xml(path, place)
+    root = root_of(path, place, warnings)
     # Both kinds of file have the same root element, and users give one for the other.
     if (distribution := root.find(DISTRIBUTION)) is not None:
         named = distribution.find("ScenarioFile")

@@ -10,6 +10,7 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.model import Offset
 from bridgegen.openx.opendrive.read import read
+from bridgegen.openx.opendrive.road_map import map_bytes
 from bridgegen.recordings.lanes.inferred import infer_lanes
 from bridgegen.recordings.lanes.lanelets import lanes_of_lanelets
 from bridgegen.recordings.lanes.model import RecordedLanes
@@ -134,7 +135,7 @@ def read_map(path: Path) -> MapLanes:
         InputError: it has no driving lane, or is too large.
     """
     warnings: list[str] = []
-    model = read(path, warnings=warnings)
+    model = read(map_bytes(path, warnings), str(path), warnings)
     lanes = lanes_of_map(model, str(path))
     return MapLanes(path, lanes, model.header.offset, tuple(warnings))
 

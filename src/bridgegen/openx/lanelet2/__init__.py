@@ -1,0 +1,1 @@
+"""Lanelet2 maps (``.osm``, Autoware's and CommonRoad's) become OpenDRIVE, when they are read."""
