@@ -1,21 +1,28 @@
-"""Link the kernels into one WebAssembly module, which simulates any row of any storyboard.
+"""Link the kernels into one module, which simulates any row of any storyboard elsewhere.
 
-    .venv/bin/python tools/portable.py      # two minutes; writes pages/web/kernels.wasm
+    .venv/bin/python tools/portable.py           # two minutes; writes pages/web/kernels.wasm
+    .venv/bin/python tools/portable.py cuda      # five; writes engine/device/kernels.ptx.gz
 
 Numba types and lowers each kernel as always; the bitcode of all is linked before anything has been
 optimised for this processor, and LLVM writes it for another one. Nothing is specialised to a
-storyboard: a bundle is a table of where its arrays lie, and a kernel that is called by its address
-has one in the module's table of functions, which ``address`` returns by its number in ``CALLED``.
-LLVM's object file is a module whose relocations hold already, so no linker is needed.
+storyboard: tables say where the arrays of its bundles lie, and a kernel that is called by its
+address is called by its number in ``CALLED``.
+
+In a browser a bundle is such a table, and functions have addresses. LLVM's object file is a module
+whose relocations hold already, so no linker is needed. On a GPU all threads share the tables, in
+constant memory, and a bundle is where the row's memory begins, so that neighbours in a warp read
+neighbouring words; and a kernel is called by a switch over all, so that the driver knows how much
+stack a thread needs.
 """
 
 import gzip
 import os
 import re
+import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Collection, Iterable, Iterator
+from typing import Any, NamedTuple
 
 # Bitcode that is not optimised must not reach the cache, whose folder is chosen at import.
 os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="bridgegen-portable-")
@@ -28,13 +35,13 @@ from numba.core.runtime import rtsys
 
 from bridgegen.assess.conflict._judge_kernels import judge_row
 from bridgegen.assess.conflict._measure_kernels import implausible_row, measure_row
+from bridgegen.assess.conflict.judging import facts_of, measuring_of, verdict_of
 from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compilation.library import KernelLibrary
 from bridgegen.base.compiled import compile_for_kernels, row_type
 from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.pages.simulation_payload import facts_of, measuring_of, verdict_of
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded import portable
 from bridgegen.simulation.embedded._rollout_kernels import simulate_row
@@ -199,32 +206,55 @@ def reachable(roots: Iterable[str]) -> set[str]:
     return found
 
 
-def linked() -> str:
-    """Return all kernels as one module in LLVM's IR, for no machine yet."""
+class Kinds(NamedTuple):
+    """Numba's types of the bundles that kernels of a row take, by what they describe."""
+
+    plan: Any
+    roads: Any
+    state: Any
+    record: Any
+    facts: Any
+    measuring: Any
+    verdict: Any
+
+
+def kinds() -> Kinds:
+    """Return the types of bundles; those of all storyboards are the same."""
     logical = load("crossroads-s4")
     pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="reference"))
     batch = pipeline.runner.nominal_batch()
     rows = batch.kinds()
-    rollout = batch.run()
+    rollout = batch.standing()
     facts = facts_of(rollout, 0, np.zeros((0, CORRIDOR)))
     bundles = (facts, measuring_of(rollout, 0), verdict_of(*rollout.shape[1:]))
-    facts, measuring, verdict = (row_type(bundle, 0) for bundle in bundles)
-    measured = (types.int64, facts, measuring, rows[3], verdict)
+    return Kinds(*rows, *(row_type(bundle, 0) for bundle in bundles))
+
+
+def module_of(symbols: Iterable[str]) -> str:
+    """Return kernels, and all that they call, as one module in LLVM's IR, for no machine yet."""
+    every = sorted(reachable(symbols))
+    print(f"{len(every)} kernels", flush=True)
+    module = llvm.parse_bitcode(KernelLibrary.by_symbol[every[0]]._bitcode)
+    for symbol in every[1:]:
+        module.link_in(llvm.parse_bitcode(KernelLibrary.by_symbol[symbol]._bitcode))
+    return _without_machine(str(module))
+
+
+def linked() -> str:
+    """Return all kernels as one module in LLVM's IR, with the entries for a page."""
+    of = kinds()
+    rows = of[:4]
+    measured = (types.int64, of.facts, of.measuring, of.record, of.verdict)
     numbers = (types.int64, types.int64, types.int64, types.float64)
     entries = {
         "simulate": symbol_of(simulate_row, rows),
-        "judge": symbol_of(judge_row, (*numbers, facts, rows[3], verdict)),
+        "judge": symbol_of(judge_row, (*numbers, of.facts, of.record, of.verdict)),
         "implausible": symbol_of(implausible_row, measured),
         "measure": symbol_of(measure_row, (types.int64, *measured)),
         "function": symbol_of(elementary.value, (types.int64, types.float64, types.float64)),
     }
     called = [symbol_of(kernel, (*first, *rows)) for kernel, first in CALLED.items()]
-    symbols = sorted(reachable([*entries.values(), *called]))
-    print(f"{len(symbols)} kernels", flush=True)
-    module = llvm.parse_bitcode(KernelLibrary.by_symbol[symbols[0]]._bitcode)
-    for symbol in symbols[1:]:
-        module.link_in(llvm.parse_bitcode(KernelLibrary.by_symbol[symbol]._bitcode))
-    return _without_machine(str(module)) + RUNTIME.format(
+    return module_of([*entries.values(), *called]) + RUNTIME.format(
         **entries,
         cases=" ".join(f"i32 {code}, label %c{code}" for code in range(1, len(called) + 1)),
         blocks="\n".join(
@@ -259,21 +289,31 @@ def _without_machine(text: str) -> str:
 
 def emitted(text: str) -> bytes:
     """Return LLVM's object file of a module for WebAssembly, optimised."""
+    machine = machine_for(TRIPLE, "generic", FEATURES)
+    return bytes(machine.emit_object(optimised(text, machine, TRIPLE, EXPORTS)))
+
+
+def machine_for(triple: str, processor: str, features: str) -> Any:
+    """Return LLVM's code generator."""
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
-    machine = llvm.Target.from_triple(TRIPLE).create_target_machine(
-        cpu="generic", features=FEATURES, opt=3, reloc="static"
+    return llvm.Target.from_triple(triple).create_target_machine(
+        cpu=processor, features=features, opt=3, reloc="static"
     )
+
+
+def optimised(text: str, machine: Any, triple: str, exports: Collection[str]) -> Any:
+    """Return a module in which all but what it exports may be inlined, and is optimised."""
     module = llvm.parse_assembly(text)
-    module.triple, module.data_layout = TRIPLE, str(machine.target_data)
+    module.triple, module.data_layout = triple, str(machine.target_data)
     for part in (*module.functions, *module.global_variables):
-        if not part.is_declaration and part.name not in EXPORTS and "llvm." not in part.name:
+        if not part.is_declaration and part.name not in exports and "llvm." not in part.name:
             part.linkage = llvm.Linkage.internal
     options = llvm.create_pipeline_tuning_options(3)
     options.loop_vectorization = options.slp_vectorization = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
-    return bytes(machine.emit_object(module))
+    return module
 
 
 # --- The module of an object file: its exports instead of what linkers read ---
@@ -372,6 +412,11 @@ def main() -> None:
     """Write the module."""
     clock = time.time()
     link_late()
+    if "cuda" in sys.argv[1:]:
+        from portable_cuda import write
+
+        write()
+        return
     module = exporting(emitted(linked()))
     portable.MODULE.write_bytes(module)
     packed = len(gzip.compress(module))

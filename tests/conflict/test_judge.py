@@ -30,8 +30,8 @@ from bridgegen.drivers.kinds import BICYCLE, CAR
 from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.pages.simulation_payload import facts_of, measuring_of
-from bridgegen.pages.simulation_payload import verdict_of as room_of
+from bridgegen.assess.conflict.judging import facts_of, measuring_of
+from bridgegen.assess.conflict.judging import verdict_of as room_of
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded._memory_kernels import Record
 

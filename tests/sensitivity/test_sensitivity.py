@@ -170,6 +170,7 @@ def test_a_driver_in_python_has_to_be_named_and_is_evaluated(tmp_path):
         "import numpy as np\n"
         "from bridgegen.drivers.interface import Control\n"
         "class Coasts:\n"
+        "    period = 0.5\n"
         "    def reset(self, n, scene):\n"
         "        pass\n"
         "    def act(self, observation):\n"

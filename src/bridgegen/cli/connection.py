@@ -1,4 +1,4 @@
-"""Options that several commands share: the connection to a simulator, and the folder of maps."""
+"""Options that commands share: connections to simulators, the folder of maps, the device."""
 
 import inspect
 import os
@@ -11,9 +11,10 @@ from typing import Annotated, Any
 
 import typer
 
+from bridgegen.base.cuda import DEVICE
 from bridgegen.base.errors import InputError
 from bridgegen.cli.declared import expand, with_parameters
-from bridgegen.engine.options.option import SIMULATOR
+from bridgegen.engine.options.option import SEARCH, SIMULATOR
 from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
 
 Connection = Mapping[str, Value]
@@ -125,17 +126,54 @@ def _root(maps: Path | None) -> Iterator[None]:
     """
     from bridgegen.openx.opendrive.road_map import ROOT
 
-    if maps is None:
-        yield
-        return
-    if not maps.is_dir():
+    if maps is not None and not maps.is_dir():
         raise InputError(f"{maps}: --maps must be a folder, and is none")
-    before = os.environ.get(ROOT)
-    # In the environment, so that processes which this one starts find the maps, too.
-    os.environ[ROOT] = str(maps)
+    with _environment(ROOT, None if maps is None else str(maps)):
+        yield
+
+
+@contextmanager
+def _environment(variable: str, value: str | None) -> Iterator[None]:
+    """Set a variable meanwhile, unless the value is None; for processes that begin, too."""
+    before = os.environ.get(variable)
+    if value is not None:
+        os.environ[variable] = value
     try:
         yield
     finally:
-        del os.environ[ROOT]
-        if before is not None:
-            os.environ[ROOT] = before
+        if value is not None:
+            del os.environ[variable]
+            if before is not None:
+                os.environ[variable] = before
+
+
+# --- The option that says on which device rows are simulated ---
+
+
+def with_device(command: Callable[..., Any]) -> Callable[..., None]:
+    """Give a command the option ``--device``, on which no result depends."""
+    option = Annotated[
+        str | None,
+        typer.Option(
+            help="cuda: a GPU of NVIDIA's simulates. No result depends on it.",
+            show_default="the processor",
+            rich_help_panel=SEARCH,
+        ),
+    ]
+    signature = inspect.signature(command)
+
+    @wraps(command)
+    def wrapper(*, device: str | None = None, **values: Any) -> None:
+        with _environment(DEVICE, device):
+            if device is not None:
+                from bridgegen.simulation.embedded.device import current
+
+                if str(values.get("workers") or "").startswith("ray"):
+                    raise InputError(f"--device {device} is this machine's, got --workers ray")
+                current()
+            command(**values)
+
+    parameter = inspect.Parameter(
+        "device", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option
+    )
+    return with_parameters(wrapper, [*signature.parameters.values(), parameter])

@@ -71,10 +71,10 @@ MANY = 20
 """Number of options above which the help of a command leaves out those that are `RARE`."""
 
 _RARE = (
-    "adversary ahead axes carla-command carla-timeout cause causes count detector distinct "
-    "distribution empty-trigger esmini-lib exposure host ideal maps metrics name needs objectives "
-    "others place port record repeats scale screen screen-batch screen-budget screen-set set "
-    "simulator-set time-limit triage vehicle weights workers worse-than"
+    "adversary ahead axes carla-command carla-timeout cause causes count detector device "
+    "distinct distribution empty-trigger esmini-lib exposure host ideal maps metrics name "
+    "needs objectives others place port record repeats scale screen screen-batch screen-budget "
+    "screen-set set simulator-set time-limit triage vehicle weights workers worse-than"
 )
 RARE = frozenset(f"--{name}" for name in _RARE.split())
 """Options that few people need; ``--help-all`` lists them, too."""

@@ -19,6 +19,7 @@ from bridgegen.cli.connection import (
     NO_CONNECTION,
     Connection,
     with_connection_options,
+    with_device,
     with_map_folder,
 )
 from bridgegen.cli.declared import declare, with_declared_options
@@ -184,6 +185,8 @@ def _add(job: Job) -> None:
         several = partial(run_all, job=job)
         command = with_run_files(several, job.options, argument)(command)
     command = with_map_folder(WHAT)(command)
+    if job in (SUITE, PREVENTABILITY, RISK):
+        command = with_device(command)
     if job is SUITE:
         suites.command(DEFAULT, cls=DefaultCommand)(command)
     elif job.name.startswith("benchmark "):

@@ -14,6 +14,7 @@ from bridgegen.cli.connection import (
     Connection,
     read_access,
     with_connection_options,
+    with_device,
     with_map_folder,
 )
 from bridgegen.engine.options.forms import read_names
@@ -91,6 +92,7 @@ def coverage(
 
 
 @analyses.command()
+@with_device
 @with_connection_options
 def regions(
     run: Annotated[Path, typer.Argument(help="The folder of a run, finished or not.")],

@@ -21,6 +21,7 @@ from bridgegen.cli.connection import (
     Connection,
     read_access,
     with_connection_options,
+    with_device,
     with_map_folder,
 )
 from bridgegen.cli.declared import with_declared_options
@@ -167,6 +168,7 @@ def _search_each(
 
 @app.command()
 @with_map_folder(WHAT)
+@with_device
 @with_run_files(search_all, every=search_catalogue)
 @with_connection_options
 @with_declared_options
@@ -280,6 +282,7 @@ def new(
 
 @app.command()
 @with_map_folder()
+@with_device
 @with_connection_options
 def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],

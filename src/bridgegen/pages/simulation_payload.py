@@ -1,6 +1,5 @@
 """What a report simulates scenarios with: kernels, a storyboard's tables, the parameters' rules."""
 
-from dataclasses import astuple
 from functools import cache
 from typing import Any
 
@@ -8,32 +7,14 @@ import numpy as np
 
 from bridgegen.assess.conflict import _codes as codes
 from bridgegen.assess.conflict import harm, quantities
-from bridgegen.assess.conflict._judge_kernels import Facts, Verdict
 from bridgegen.assess.conflict._limits import HORIZON, SERIOUS_DECELERATION
-from bridgegen.assess.conflict._measure_kernels import IOU, MEASURED, Measuring
-from bridgegen.assess.conflict._violation_kernels import LEAVINGS, PASSINGS
+from bridgegen.assess.conflict._measure_kernels import IOU, MEASURED
 from bridgegen.assess.conflict.findings import KINDS
-from bridgegen.assess.conflict.plausibility import (
-    AFTER,
-    Implausible,
-    limits_of,
-    towed_by_of,
-    window_of,
-)
+from bridgegen.assess.conflict.judging import facts_of, measuring_of, verdict_of
+from bridgegen.assess.conflict.plausibility import Implausible
 from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule, Zone
-from bridgegen.assess.metrics import (
-    OF_BASELINE,
-    braking,
-    distances,
-    impact,
-    perception,
-    road,
-    times,
-)
-from bridgegen.assess.metrics.metric import in_steps
-from bridgegen.base.arrays import Float
+from bridgegen.assess.metrics import OF_BASELINE
 from bridgegen.base.errors import InputError
-from bridgegen.base.physics import GRIP, HARD_BRAKING
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages.packed import deflated
 from bridgegen.pages.storyboard_payload import storyboard_payload
@@ -42,7 +23,6 @@ from bridgegen.scenario.language.criteria import PREFIX
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.simulation.adversary import AdversarySource
 from bridgegen.simulation.embedded import portable
-from bridgegen.simulation.rollout import Rollout
 
 TRIED = 64
 """Number of random rows that are run first, so that the ways are planned that rows may need."""
@@ -161,74 +141,6 @@ def _verdict(pipeline: Pipeline) -> dict[str, bool]:
 @cache
 def _kernels() -> str:
     return deflated(portable.MODULE.read_bytes())
-
-
-def facts_of(rollout: Rollout, row: int, corridor: Float) -> Facts:
-    """Return what judging a row needs besides its record.
-
-    Args:
-        rollout: of rows of the same storyboard.
-        row: one on the same road network.
-        corridor: of the ego's first path there; see `Facts`.
-    """
-    e = rollout.shape[1]
-    stops = rollout.stop_entities.size
-    return Facts(
-        box=rollout.box,
-        half=0.5 * rollout.box[:, :2],
-        kinds=np.ascontiguousarray(rollout.kinds, dtype=np.int64),
-        claims=rollout.claims[row] if rollout.claims.size else np.zeros((e, e), np.int64),
-        crosswalks=rollout.crosswalks[row] if rollout.crosswalks.size else np.zeros((0, 5)),
-        stop_entities=np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
-        stop_lights=np.ascontiguousarray(rollout.stop_lights, dtype=np.int64),
-        stop_lines=rollout.stop_lines[row] if stops else np.zeros((0, 3)),
-        corridor=corridor,
-        time_step=rollout.time_step,
-        after=round(AFTER / rollout.time_step),
-        own_bodies=sum(rollout.is_ego_s(entity) for entity in range(e)),
-    )
-
-
-def measuring_of(rollout: Rollout, row: int) -> Measuring:
-    """Return what measuring a row needs besides; see `facts_of`."""
-    own, dt = np.flatnonzero(rollout.stop_entities == 0), rollout.time_step
-    classes = perception.CLASS_OF_KIND[rollout.kinds]
-    return Measuring(
-        limits=limits_of(rollout),
-        towed_by=np.ascontiguousarray(towed_by_of(rollout), dtype=np.int64),
-        window=window_of(rollout),
-        merged=in_steps("MERGED", impact.MERGED, dt),
-        abrupt=in_steps("ABRUPT", braking.ABRUPT, dt),
-        longest=in_steps("LONGEST", times.LONGEST, dt),
-        hard=HARD_BRAKING,
-        most=braking.MOST,
-        grip=GRIP,
-        target=times.TARGET,
-        beside=road.ASIDE,
-        safe=np.array(astuple(distances.Parameters())),
-        lines=rollout.stop_lines[row, own] if own.size else np.zeros((0, 3)),
-        line_lights=np.ascontiguousarray(rollout.stop_lights[own], dtype=np.int64),
-        classes=classes,
-        reach=perception.RANGES[classes],
-        class_of_kind=perception.CLASS_OF_KIND,
-        ranges=perception.RANGES,
-        thresholds=perception.THRESHOLDS,
-    )
-
-
-def verdict_of(e: int, t: int) -> Verdict:
-    """Return room for the verdict on a row of E entities and T instants."""
-    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(Verdict._fields, (e, t))
-    shapes |= dict.fromkeys(("potential", "severity", "aside", "breach", "at_fault"), (e,))
-    shapes |= {"whole": (e, codes.INTEGERS), "real": (e, codes.FLOATS), "changes": (e, 2)}
-    shapes |= {"is_judged": (1,), "least": (1,), "over": (1,), "instants": (2,), "gaps": (2,)}
-    shapes |= {"until": (1,)}
-    shapes |= {"apart": (2, t), "leave": (LEAVINGS,), "passed": (PASSINGS,)}
-    kinds: dict[str, Any] = dict.fromkeys(
-        ("whole", "instants", "until", "leave", "passed"), np.int64
-    )
-    kinds |= dict.fromkeys(("is_judged", "at_fault", "reverses"), np.bool_)
-    return Verdict(**{n: np.zeros(shape, kinds.get(n, float)) for n, shape in shapes.items()})
 
 
 def _refuse_what_is_not_portable(pipeline: Pipeline) -> None:

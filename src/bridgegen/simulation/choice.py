@@ -1,9 +1,11 @@
 """Which simulator runs a scenario, and how; what is asked for on the command line."""
 
+import os
 from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from bridgegen.base.cuda import DEVICE
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.base.plugins import PlugIns, Registry
 from bridgegen.simulation.vehicles import KINEMATIC
@@ -194,6 +196,8 @@ class SimulatorChoice:
                 simulator.
         """
         driver = embedded.program.driver
+        if device := os.environ.get(DEVICE):
+            _require_compiled(embedded, self.name, f"--device {device}")
         if driver.home not in ("", self.name):
             raise InputError(
                 f"{embedded.program.place}: the driver '{driver.name}' drives in the simulator "
@@ -216,6 +220,23 @@ class SimulatorChoice:
                 f"{' and '.join(_OURS)} run, got {self.name}"
             )
         return SIMULATORS[self.name].make(embedded, storyboard, self.settings, self.access)
+
+
+def _require_compiled(embedded: "EmbeddedSimulator", simulator: str, asker: str) -> None:
+    """Check that a storyboard runs on a device.
+
+    Raises:
+        InputError: it does not.
+    """
+    driver, place = embedded.program.driver, embedded.program.place
+    if simulator != EMBEDDED.name:
+        raise InputError(f"{place}: {asker} runs the embedded simulator, got {simulator}")
+    if driver.is_own or driver.home:
+        raise InputError(
+            f"{place}: {asker} runs drivers that ship, which are compiled, got '{driver.name}'"
+        )
+    if embedded.partners:
+        raise InputError(f"{place}: {asker} runs one ego, and the scenario has several")
 
 
 EMBEDDED = SimulatorChoice()

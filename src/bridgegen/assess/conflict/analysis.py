@@ -145,6 +145,12 @@ class Conflicts:
         vehicle = np.where(np.isin(body, self.driven), body, 0)
         return vehicle, np.where(other == 0, vehicle, np.where(other == vehicle, 0, other))
 
+    def take(self, at: Int) -> "Conflicts":
+        """Return those of some rows."""
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        some: dict[str, Any] = {n: v[at] for n, v in values.items() if isinstance(v, np.ndarray)}
+        return replace(self, **some)
+
     @cached_property
     def at_fault(self) -> Bool:
         """``(N, E)``: the ego has failed.

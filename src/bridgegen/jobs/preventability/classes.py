@@ -8,7 +8,9 @@ import numpy.typing as npt
 from bridgegen.assess.conflict.plausibility import Implausible, plausibility
 from bridgegen.assess.metrics.metric import distance, steps
 from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.engine.judged import judge
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.runner import Runner
 from bridgegen.simulation.rollout import Rollout
 
 TOUCH = 0.01
@@ -69,12 +71,26 @@ def outcomes(pipeline: Pipeline, X: Float) -> Codes:
     """
     found = np.empty(len(X), np.int8)
     for at, runner in pipeline.runner.by_variant(X):
-        # A cell asks only whether there is a collision, so a row ends with it.
-        rollout = runner.run(X[at], until_collision=True)
-        code = np.where(collides(rollout), Outcome.COLLIDED, Outcome.AVOIDED)
-        implausible = plausibility(rollout).code != Implausible.NONE
-        code = np.where(implausible, Outcome.NOT_APPLICABLE, code)
-        found[at] = np.where(rollout.status != 0, Outcome.FAILED, code)
+        judged = judge(runner, X[at], until_collision=True)
+        if judged is None:
+            found[at] = _of_motion(runner, X[at])
+            continue
+        code = np.where(judged.code != Implausible.NONE, Outcome.NOT_APPLICABLE, Outcome.AVOIDED)
+        found[at] = np.where(judged.status != 0, Outcome.FAILED, code)
+        # How deep boxes overlap is seen in the motion.
+        if (touching := at[judged.touches & (found[at] == Outcome.AVOIDED)]).size:
+            found[touching] = _of_motion(runner, X[touching])
+    return found
+
+
+def _of_motion(runner: Runner, X: Float) -> Codes:
+    """Return the outcome of N rows of one storyboard."""
+    # A cell asks only whether there is a collision, so a row ends with it.
+    rollout = runner.run(X, until_collision=True)
+    code = np.where(collides(rollout), Outcome.COLLIDED, Outcome.AVOIDED)
+    implausible = plausibility(rollout).code != Implausible.NONE
+    code = np.where(implausible, Outcome.NOT_APPLICABLE, code)
+    found: Codes = np.where(rollout.status != 0, Outcome.FAILED, code).astype(np.int8)
     return found
 
 

@@ -89,7 +89,7 @@ class Experiment:
             return np.empty((0, len(Column)))
         found = self._ledger.next(Z, least)
         if found is None:
-            found = self._simulated(self._exposure.from_normal(Z))
+            found = self._simulated(self._exposure.from_normal(Z), least)
             self._ledger.keep(Z, least, found)
         self.evaluations += len(Z)
         self.failed += int(np.sum(found.values[:, Column.RESULT] == 0.0))
@@ -97,8 +97,8 @@ class Experiment:
         self._progress(self.evaluations)
         return self._numbered(found)
 
-    def _simulated(self, X: Float) -> Outcomes:
-        parts = self._workers.map(self._pipeline, outcomes, X, self._count)
+    def _simulated(self, X: Float, least: float) -> Outcomes:
+        parts = self._workers.map(self._pipeline, outcomes, X, self._count, least)
         return Outcomes.join(
             [
                 Outcomes.lost(part.rows) if isinstance(part.result, Lost) else part.result

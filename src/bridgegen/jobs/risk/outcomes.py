@@ -9,12 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.assess.conflict._limits import HORIZON
-from bridgegen.assess.conflict.analysis import COURSE, encounters
+from bridgegen.assess.conflict.analysis import COURSE, Conflicts, encounters
+from bridgegen.assess.conflict.analysis import NEAR_MISS as NEARLY
 from bridgegen.assess.conflict.findings import Findings
 from bridgegen.assess.conflict.harm import NEAR_MISS, Count, closeness_of_pairs, decisive
 from bridgegen.assess.conflict.plausibility import Implausible, plausibility
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import UnknownNameError
+from bridgegen.engine.judged import judge
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.runner import Runner
 from bridgegen.jobs.risk.estimators.weighted import Weighted
@@ -78,18 +80,19 @@ class Outcomes:
         return cls(values, ())
 
 
-def outcomes(pipeline: Pipeline, X: Float, count: Count) -> Outcomes:
+def outcomes(pipeline: Pipeline, X: Float, count: Count, least: float = -np.inf) -> Outcomes:
     """Simulate N rows, in this thread.
 
     Args:
         pipeline: of the driver.
         X: ``(N, len(space.names))`` feasible rows.
         count: whose conflicts count.
+        least: outcomes with a lower score may have any lower score.
     """
     values = Outcomes.lost(len(X)).values
     words = np.full(len(X), "", dtype=object)
     for at, runner in pipeline.runner.by_variant(X):
-        values[at], words[at] = _outcomes(runner, X[at], count)
+        values[at], words[at] = _outcomes(runner, X[at], count, least)
     harmful = values[:, Column.SCORE] >= NEAR_MISS
     modes = dict.fromkeys(words[harmful])
     numbers = {mode: number for number, mode in enumerate(modes)}
@@ -97,32 +100,48 @@ def outcomes(pipeline: Pipeline, X: Float, count: Count) -> Outcomes:
     return Outcomes(values, tuple(modes))
 
 
-def _outcomes(runner: Runner, X: Float, count: Count) -> tuple[Float, npt.NDArray[np.object_]]:
-    rollout = runner.run(X)
-    conflicts = encounters(rollout)
-    gate = plausibility(rollout)
+def _outcomes(
+    runner: Runner, X: Float, count: Count, least: float
+) -> tuple[Float, npt.NDArray[np.object_]]:
+    values, words = Outcomes.lost(len(X)).values, np.full(len(X), "", dtype=object)
+    if (judged := judge(runner, X)) is not None:
+        status, code = judged.status, judged.code.astype(np.int8)
+        ok = (status == 0) & (code == Implausible.NONE)
+        # Of a million rows a few hundred come near: only those are looked at one by one.
+        at = np.flatnonzero(ok & (judged.worst >= NEARLY) if least >= NEAR_MISS else ok)
+        conflicts = judged.conflicts(at)
+    else:
+        rollout = runner.run(X)
+        status, code = rollout.status, plausibility(rollout).code
+        # Neither a failed row nor one whose traffic could not happen counts as an event.
+        ok = (status == 0) & (code == Implausible.NONE)
+        at, whole = np.flatnonzero(ok), encounters(rollout)
+        conflicts = whole.take(at)
+    values[:, Column.RESULT] = np.where(status != 0, 0.0, np.where(ok, 1.0, -1.0))
+    if at.size:
+        values[at], words[at] = _of_conflicts(conflicts, count)
+    return values, words
+
+
+def _of_conflicts(conflicts: Conflicts, count: Count) -> tuple[Float, npt.NDArray[np.object_]]:
+    """Return the outcomes of rows that could happen, and the words of their modes."""
+    n = len(conflicts.kind)
+    values, rows = Outcomes.lost(n).values, np.arange(n)
     other, _ = decisive(conflicts, count)
     score, own, near = (
         closeness_of_pairs(conflicts, of).max(axis=1) for of in (count, "ego", "any")
     )
-    rows = np.arange(len(X))
-    values = Outcomes.lost(len(X)).values
-    # Neither a failed row nor one whose traffic could not happen counts as an event.
-    ok = (rollout.status == 0) & (gate.code == Implausible.NONE)
     # Harm alone is 0 where the ego is not responsible: levels that followed it ended in front of
     # such conflicts (cut-in, `careful`: at 0.2, never at 0.3).
     led = np.where(score >= NEAR_MISS, score, ALMOST * np.minimum(near, NEAR_MISS))
-    values[ok, Column.SCORE], values[ok, Column.OWN] = led[ok], own[ok]
-    values[ok, Column.SEVERITY] = conflicts.severity[rows, other][ok]
+    values[:, Column.SCORE], values[:, Column.OWN] = led, own
+    values[:, Column.SEVERITY] = conflicts.severity[rows, other]
     meets = (conflicts.kind == COURSE) | conflicts.at_fault | (count == "any")
     meets[:, 0] = False
-    values[ok, Column.TTC] = np.where(meets, conflicts.ttc, HORIZON).min(axis=1, initial=HORIZON)[
-        ok
-    ]
-    values[:, Column.RESULT] = np.where(rollout.status != 0, 0.0, np.where(ok, 1.0, -1.0))
-    found = Findings.of(conflicts, gate.labels, count)
-    words = found.conflict_type + ", " + found.rule + ", with " + found.partner
-    return values, words
+    ttc = np.where(meets, conflicts.ttc, HORIZON)
+    values[:, Column.TTC], values[:, Column.RESULT] = ttc.min(axis=1, initial=HORIZON), 1.0
+    found = Findings.of(conflicts, [""] * n, count)
+    return values, found.conflict_type + ", " + found.rule + ", with " + found.partner
 
 
 # --- The events whose probability is estimated, by severity ---

@@ -214,8 +214,8 @@ class Batch:
             # route and node alone, so it does not matter when, or for which row, it was planned.
             wanted = np.column_stack((self._rows[again], self.state.wanted[again]))
             self._roads.plan(tuple(item) for item in wanted.tolist())
-            state = _taken(_seen(before[0], self.state), again)
-            record = _taken(self.record, again)
+            state = taken(_seen(before[0], self.state), again)
+            record = taken(self.record, again)
             # An event that began in the first attempt counts from the second one only.
             record.began[:] = before[1][again]
             mine = (
@@ -226,8 +226,8 @@ class Batch:
                 *mine, self.plan, self._roads.tables, self._rows[again], state, record
             )
             self._messages |= {int(again[row]): text for row, text in (messages or {}).items()}
-            _put_back(self.state, state, again)
-            _put_back(self.record, record, again)
+            put_back(self.state, state, again)
+            put_back(self.record, record, again)
 
     def observe(
         self,
@@ -496,16 +496,32 @@ def _room(array: np.ndarray) -> int:
     return -(-array.nbytes // ALIGNED) * ALIGNED
 
 
-def _taken(rows: Rows, some: Int) -> Rows:
+def taken(rows: Rows, some: Int) -> Rows:
     """Return a copy of some of the rows."""
     arrays: Any = (array[some] for array in rows)
     return type(rows)(*arrays)
 
 
-def _put_back(rows: Rows, part: Rows, some: Int) -> None:
+def put_back(rows: Rows, part: Rows, some: Int) -> None:
+    """Overwrite some of the rows."""
     arrays: Any = rows
     for whole, array in zip(arrays, part, strict=True):
         whole[some] = array
+
+
+def starts_of(program: Program, roads: Network, rows: Int, slots: Float) -> tuple[Float, Float]:
+    """Return where entities start, along their paths and to the left of them, ``(N, E)`` each [m].
+
+    Args:
+        program: the compiled storyboard.
+        roads: see `Batch`,
+        rows: likewise.
+        slots: ``(N, S)``, see `Program.fill`.
+    """
+    start = slots[:, np.maximum(program.start_slots, 0)]  # of no effect where there is no slot
+    varied = slots[:, np.maximum(program.aside_slots, 0)]
+    aside = np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0)
+    return roads.stations(rows, start), aside
 
 
 def _state(
@@ -519,8 +535,7 @@ def _state(
     """Return the state of N rows before they start; ``start`` sets what else is not 0."""
     n, e = len(rows), len(program.names)
     m = e - 1 + len(program.ghosts)
-    start = slots[:, np.maximum(program.start_slots, 0)]  # of no effect where there is no slot
-    varied = slots[:, np.maximum(program.aside_slots, 0)]
+    station, aside = starts_of(program, roads, rows, slots)
     hypotheses = roads.scene.hypotheses.shape[1]
     compiled = own if own and own.memory is not None else None  # else it has arrays of its own
     wants = compiled.wants if compiled else ()
@@ -570,8 +585,8 @@ def _state(
     }
     given = {
         "slots": slots,
-        "station": roads.stations(rows, start),
-        "aside": np.where(program.aside_slots >= 0, roads.sides[rows] * varied, 0.0),
+        "station": station,
+        "aside": aside,
         "key": key[:, None],
         "feet": np.full((n, hypotheses), LOST),
     }

@@ -21,8 +21,8 @@ from bridgegen.base.errors import InputError
 from bridgegen.drivers import STORYBOARD, get
 from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
-from bridgegen.simulation.embedded import _memory_kernels as memory
-from bridgegen.simulation.embedded.addresses import CALLED, FIELDS, addressed
+from bridgegen.simulation.embedded import device
+from bridgegen.simulation.embedded.addresses import FIELDS
 from bridgegen.simulation.embedded.drivers import DEMANDS
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
@@ -46,15 +46,29 @@ def sources() -> str:
     judging = ("_judge_kernels.py", "_measure_kernels.py")
     entries += [PACKAGE / "assess" / "conflict" / name for name in judging]
     for path in sorted(with_imported(entries)):
-        tree = ast.parse(path.read_text("utf-8"))
-        for node in ast.walk(tree):
-            if isinstance(body := getattr(node, "body", None), list):
-                node.body = [  # type: ignore[attr-defined]
-                    part
-                    for part in body
-                    if not (isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant))
-                ]
-        found.update(ast.dump(tree).encode())
+        found.update(_code_of(path))
+    return found.hexdigest()[:16]
+
+
+def _code_of(path: Path) -> bytes:
+    """Return the code of a file, without comments and docstrings."""
+    tree = ast.parse(path.read_text("utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            node.body = [  # type: ignore[attr-defined]
+                part
+                for part in body
+                if not (isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant))
+            ]
+    return ast.dump(tree).encode()
+
+
+def device_sources() -> str:
+    """Return the same of the module for a GPU."""
+    found = hashlib.sha256(sources().encode())
+    found.update(_code_of(PACKAGE / "engine" / "_device_kernels.py"))
+    laid = (device.JOB, device.INTERLEAVED, device.Given._fields, device.Found._fields)
+    found.update(repr(laid).encode())
     return found.hexdigest()[:16]
 
 
@@ -83,7 +97,7 @@ def tables(
     if roads.partners:
         raise InputError("the ego's driver drives several vehicles")
     batch = Batch(program, roads, np.array([network]), {})
-    plan = _coded(batch.plan, program)
+    plan = device.coded(batch.plan, program)
     unset: Any = {name: np.zeros_like(getattr(batch.record, name)) for name in UNSET}
     data = bytearray()
     return {
@@ -107,13 +121,6 @@ def tables(
     }
 
 
-def _coded(plan: memory.Plan, program: Program) -> memory.Plan:
-    """Return a plan with the numbers of the kernels that it needs, in place of addresses."""
-    order = list(CALLED)
-    drives = DEMANDS.get(program.driver.kernel)
-    return addressed(plan, drives, lambda kernel: 1 + order.index(kernel))
-
-
 def _others(
     program: Program, roads: Network, batch: "Batch", network: int
 ) -> dict[str, dict[str, Any]]:
@@ -124,13 +131,13 @@ def _others(
     from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
     found: dict[str, dict[str, Any]] = {}
-    here = _coded(batch.plan, program)
+    here = device.coded(batch.plan, program)
     for name in DEMANDS if program.driver != STORYBOARD else ():
         changed = program.changed(driver=get(name))
         if changed.driver.perceives and not program.driver.perceives:
             continue  # the road tables of others have no hypotheses to predict by
         other = Batch(changed, roads, np.array([network]), {})
-        plan = _coded(other.plan, changed)
+        plan = device.coded(other.plan, changed)
         states: Any = zip(batch.state, other.state, strict=True)
         numbers: Any = zip(here._replace(driver_code=0), plan._replace(driver_code=0), strict=True)
         same = all(a.shape == b.shape for a, b in states)

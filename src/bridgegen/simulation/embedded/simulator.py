@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.base.arrays import Float, Int
+from bridgegen.base.cuda import DEVICE
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import Driver
 from bridgegen.drivers._weather_columns import WEATHER
@@ -88,6 +89,9 @@ CHUNK = 128
 CHUNK_BYTES, INSTANT_BYTES, VERTEX_BYTES = 16 * 2**20, 112, 80
 """Largest size of the records of a chunk of rows, size of an entity's instant, and of a vertex of
 its path [bytes]; a small chunk is traversed quickly."""
+
+DEVICE_ROWS, DEVICE_BYTES = 16_384, 2**30
+"""Likewise of a batch that a GPU rolls out: it is busy from some ten thousand rows on."""
 
 LOCK_STEP_ROWS = 1024
 """Number of rows that a driver in Python drives at a time: a thousand take it little longer than
@@ -168,6 +172,9 @@ class EmbeddedSimulator:
         if self._asks_python:
             return LOCK_STEP_ROWS
         entities, vertices = len(self.program.names), self.program.most_vertices
+        if os.environ.get(DEVICE):
+            rows = DEVICE_BYTES // (entities * self.program.n_steps * INSTANT_BYTES)
+            return max(1, min(DEVICE_ROWS, rows))
         # With 30 actors a chunk of 128 rows records more than the cache holds: 9.4 ms a row,
         # instead of 7.2 in chunks of 12.
         each = entities * (INSTANT_BYTES * self.program.n_steps + VERTEX_BYTES * vertices)
@@ -248,7 +255,7 @@ class EmbeddedSimulator:
                 f"the driver '{chosen.driver.name}' drives in {chosen.driver.home} alone"
             )
         if not chosen.driver.is_own:
-            return self.batch(
+            batch = self.batch(
                 roads,
                 rows,
                 values,
@@ -257,7 +264,12 @@ class EmbeddedSimulator:
                 kinematic=kinematic,
                 noise=noise,
                 until_collision=until_collision,
-            ).run()
+            )
+            if not os.environ.get(DEVICE):
+                return batch.run()
+            from bridgegen.simulation.embedded.device import current
+
+            return batch.run(partial(current().simulate_rows, chosen))
         # The driver's process may have to be given some of the rows again, so it is handed what
         # makes batches, not a batch.
         some = self._some(
