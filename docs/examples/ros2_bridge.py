@@ -1,12 +1,11 @@
 """Autoware's planning as a driver, without ROS on this side: CDR over Zenoh.
 
-zenoh-bridge-ros2dds                # beside Autoware; it listens on port 7447
-pip install eclipse-zenoh           # here
-bridgegen search my.yaml --time-limit 90 --ego "exec:python server.py ros2_bridge.py:Autoware"
+zenoh-bridge-ros2dds            # beside Autoware; it listens on port 7447
+pip install eclipse-zenoh       # beside BridgeGen
+bridgegen search my.yaml --ego ros2_bridge.py:Autoware --time-limit 90
 
-server.py and messages.py are drivers/remote's, copied beside this file where BridgeGen is not
-installed for this Python (3.10 or later). ZENOH_CONNECT is the address of zenoh-bridge-ros2dds if
-it is not tcp/127.0.0.1:7447. Published at each instant, every 0.1 s:
+ZENOH_CONNECT is zenoh-bridge-ros2dds's address if it is not tcp/127.0.0.1:7447. Published at each
+instant, every 0.1 s:
 
     /tf                                     tf2_msgs/TFMessage, map -> base_link (the rear axle)
     /localization/kinematic_state           nav_msgs/Odometry
@@ -16,8 +15,8 @@ it is not tcp/127.0.0.1:7447. Published at each instant, every 0.1 s:
     /planning/mission_planning/goal         geometry_msgs/PoseStamped, at the start only
 
 Then a new /planning/trajectory (autoware_planning_msgs/Trajectory) is awaited, and followed. Until
-the first one comes the first instant is repeated: the clock runs, the world stands. The clock never
-goes back: the next scenario begins a second after the last one.
+the first one comes the first instant is repeated: the clock runs, the world stands. The clock is
+the system's at the begin, and never goes back: a scenario begins a second after the last one.
 """
 
 import json
@@ -26,9 +25,10 @@ import os
 import struct
 import threading
 import time
-from types import SimpleNamespace
 
 import numpy as np
+
+from bridgegen.drivers.interface import Trajectory
 
 START, ANSWER = 60.0, 5.0  # s, of real time: until the first trajectory, and each later one
 LAG = 300_000_000  # ns that a trajectory's stamp may be behind the clock: nodes work in turn
@@ -137,7 +137,7 @@ class Autoware:
         self.session = zenoh.open(config)
         self.arrived, self.data = threading.Condition(), b""
         self.subscriber = self.session.declare_subscriber("planning/trajectory", self.take)
-        self.clock = self.begin = 0  # ns
+        self.clock = self.begin = time.time_ns()
 
     def take(self, sample) -> None:
         with self.arrived:
@@ -241,7 +241,7 @@ def followed(points, x, y):
     n = int(np.argmax(np.append(mean < STILL, True)))
     seconds = np.cumsum(np.concatenate([[0.0], far[:n] / mean[:n], [10.0]]))  # and there it stands
     found = np.vstack([path[: n + 1], path[n] * (1.0, 1.0, 1.0, 0.0)])
-    return SimpleNamespace(time=seconds, **dict(zip("xyhv", found.T[:, None], strict=True)))
+    return Trajectory(time=seconds, **dict(zip("xyhv", found.T[:, None], strict=True)))
 
 
 def yaw(x, y, z, w):
