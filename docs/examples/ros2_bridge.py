@@ -2,7 +2,7 @@
 
 zenoh-bridge-ros2dds            # beside Autoware; it listens on port 7447
 pip install eclipse-zenoh       # beside BridgeGen
-bridgegen search my.yaml --ego ros2_bridge.py:Autoware --time-limit 90
+bridgegen search my.yaml --ego ros2_bridge.py:Autoware --workers 1 --time-limit 90
 
 ZENOH_CONNECT is zenoh-bridge-ros2dds's address if it is not tcp/127.0.0.1:7447. Published at each
 instant, every 0.1 s:
