@@ -32,11 +32,10 @@ from bridgegen.drivers.interface import Trajectory
 
 START, ANSWER = 60.0, 5.0  # s, of real time: until the first trajectory, and each later one
 LAG = 300_000_000  # ns that a trajectory's stamp may be behind the clock: nodes work in turn
-STILL = 0.05  # m/s: slower than that, a plan stands
+STILL, NEAR = 0.05, 2.0  # m/s: slower, a plan stands; m: farther off, it is of another scenario
 STEP, STEPS = 0.5, 21  # s, of the predicted paths of objects
 HEIGHT = 1.5  # m, of an object: tracks have none
 LABELS = (1, 2, 3, 5, 6, 7, 8, 0)  # ObjectClassification's, by BridgeGen's class
-MOST_POINTS = 900  # BridgeGen takes 1000
 NONE, ZEROS = (0.0,) * 3, (0.0,) * 36
 
 # --- Messages: their fields' types in the order of ROS 2's and autoware_msgs' definitions ---------
@@ -131,9 +130,9 @@ class Autoware:
     def __init__(self) -> None:
         import zenoh
 
-        config, default = zenoh.Config(), "tcp/127.0.0.1:7447"
-        address = json.dumps([os.environ.get("ZENOH_CONNECT", default)])
-        config.insert_json5("connect/endpoints", address)
+        config, address = zenoh.Config(), os.environ.get("ZENOH_CONNECT", "tcp/127.0.0.1:7447")
+        config.insert_json5("connect/endpoints", json.dumps([address]))
+        config.insert_json5("mode", '"client"')  # which neither listens nor looks around
         self.session = zenoh.open(config)
         self.arrived, self.data = threading.Condition(), b""
         self.subscriber = self.session.declare_subscriber("planning/trajectory", self.take)
@@ -152,10 +151,10 @@ class Autoware:
         self.tell(o)
         points = self.awaited(ANSWER) if self.last else self.first(o)
         if not points:
-            limit = ANSWER if self.last else START
-            raise TimeoutError(f"no new /planning/trajectory within {limit:g} s")
+            wait = ANSWER if self.last else START
+            raise TimeoutError(f"no new /planning/trajectory at the ego within {wait:g} s")
         self.last = o.time, float(o.h[0])
-        return followed(points, float(o.x[0]), float(o.y[0]))
+        return followed(points, *self.place)
 
     def first(self, o):
         """Return the points of the first trajectory: the clock runs, the world stands."""
@@ -175,15 +174,16 @@ class Autoware:
         with self.arrived:
             while self.data or self.arrived.wait(until - time.monotonic()):
                 (stamp, _), points = decode("Trajectory", self.data)
-                if stamp[0] * 10**9 + stamp[1] >= self.clock - LAG and points:
+                near = (math.dist(p[1][0][:2], self.place) < NEAR for p in points)
+                if stamp[0] * 10**9 + stamp[1] >= self.clock - LAG and any(near):
                     return points
                 self.data = b""
         return None
 
     def tell(self, o) -> None:
         """Publish an instant, its clock last."""
-        self.data = b""
         x, y, h, v, a = (float(one[0]) for one in (o.x, o.y, o.h, o.v, o.a))
+        self.data, self.place = b"", (x, y)
         place, turn = pose(x, y, h)
         since, before = self.last or (-math.inf, h)
         rate = math.remainder(h - before, math.tau) / (o.time - since)
@@ -234,7 +234,7 @@ def followed(points, x, y):
     share = ahead.sum(axis=1) / (step[:, :2] ** 2).sum(axis=1)
     beside = path[:-1] + np.clip(share, 0.0, 1.0)[:, None] * step
     i = int(np.argmin(np.hypot(beside[:, 0] - x, beside[:, 1] - y)))
-    path = np.vstack([beside[i], path[i + 1 : i + MOST_POINTS]])
+    path = np.vstack([beside[i], path[i + 1 : i + 900]])  # BridgeGen takes 1000
     far = np.hypot(*np.diff(path[:, :2], axis=0).T)
     path, far = path[np.append(True, far > 1e-3)], far[far > 1e-3]
     mean = 0.5 * (path[:-1, 3] + path[1:, 3])
