@@ -22,6 +22,8 @@ from bridgegen.assess.conflict.analysis import (
     ConflictType,
     analyse,
 )
+from bridgegen.assess.conflict.judging import facts_of, measuring_of
+from bridgegen.assess.conflict.judging import verdict_of as room_of
 from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.assess.metrics import evaluate
 from bridgegen.assess.metrics.distances import closest
@@ -30,8 +32,6 @@ from bridgegen.drivers.kinds import BICYCLE, CAR
 from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.assess.conflict.judging import facts_of, measuring_of
-from bridgegen.assess.conflict.judging import verdict_of as room_of
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded._memory_kernels import Record
 
