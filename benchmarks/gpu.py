@@ -1,6 +1,6 @@
 """How fast rows are on a GPU; each part in a process of its own, with a limit of time.
 
-    .venv/bin/python -m benchmarks.gpu          # on a machine with a GPU, three minutes at most once compiled
+    .venv/bin/python -m benchmarks.gpu          # three minutes at most, once it is compiled
     .venv/bin/python -m benchmarks.gpu --host   # its PTX on this processor: bits, and no times
 
 A part that fails or takes too long says so, and the others are measured.

@@ -394,7 +394,8 @@ class Device:
             self._gpu.get(block, job["record"])
             done = found.done[:, 0] == 1
             rows = slice(None) if done.all() else np.flatnonzero(done)
-            for array, part in zip(records, views_of(block, records), strict=True):
+            pairs: Any = zip(records, views_of(block, records), strict=True)
+            for array, part in pairs:
                 array[rows] = part[rows]
         return found
 
