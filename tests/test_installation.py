@@ -50,9 +50,11 @@ def test_its_extras_are_those_of_the_project_that_users_install():
     modules = {  # other names
         "comma-deps-acados": "acados",
         "fiss-planner": "fiss_planner",
+        "grpcio": "grpc",
         "highway-env": "highway_env",
         "jpype1": "jpype",
         "metadrive-simulator": "metadrive",
+        "rerun-sdk": "rerun",
         "stable-baselines3": "stable_baselines3",
     }
     for extra, (needed, _) in EXTRAS.items():
