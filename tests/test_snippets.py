@@ -10,6 +10,7 @@ Searches are shortened (``shortened``), but not those of the pages ``AS_PRINTED`
 a block says what else is to be known:
 ``<!-- not run: WHY -->`` and ``<!-- tested by: FILE -->`` (what takes too long here; the commands
 of both must still parse), ``<!-- file: NAME -->`` (what the reader saves as that file),
+``<!-- varies: WHAT -->`` (output with numbers that other processors may change),
 ``<!-- exit: 3 -->``, ``<!-- ci -->`` (the YAML of another program), ``<!-- excerpt -->`` (no
 output, but a part of a file), ``<!-- shortened -->`` (of a page ``AS_PRINTED``: nothing that it
 prints depends on these commands).
@@ -374,6 +375,6 @@ def test_few_snippets_cannot_be_run():
 def test_marks_are_those_that_are_known():
     for block in (block for name in PAGES for block in blocks(name)):
         assert block.mark in (
-            "", *ELSEWHERE, "file", "exit", "ci", "excerpt", "shortened"
+            "", *ELSEWHERE, "file", "exit", "ci", "excerpt", "shortened", "varies"
         ), block.mark  # fmt: skip
         assert block.mark != "tested by" or (ROOT / block.value).is_file(), block.value
