@@ -1,6 +1,6 @@
 """AVLite's velocity planner (PyPI's avlite 0.6.6) as a driver: its speeds along the route.
 
-It follows the route, and slows for whoever it foresees on it; AVLite itself is unchanged.
+It follows the route, and slows for participants that it predicts on it; AVLite itself is unchanged.
 """
 
 import numpy as np

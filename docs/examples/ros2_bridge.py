@@ -97,7 +97,7 @@ def put(kind, value, out) -> None:
 
 
 def decode(kind, data):
-    """Return the message as nested tuples; ValueError if it is none of that kind."""
+    """Return the message as nested tuples; ValueError if it is not of this type."""
     if data[:2] != HEAD[:2]:
         raise ValueError(f"a {kind} must be plain CDR, little-endian, got {data[:4].hex()}")
     try:
