@@ -169,6 +169,12 @@ def test_a_row_alone_has_the_bits_of_the_batch(driven, name, ego):
     assert conflicts or ego == "reference"
 
 
+def test_what_sensors_see_where_nothing_is_counts_as_in_the_batch(driven):
+    ((batch, rollout, corridors),) = driven("phantom-braking", "reference", 10)
+    assert rollout.ghosts.any()
+    agree(rollout, batch.record, corridors, batch.state.on[:, 0])
+
+
 @pytest.fixture(scope="module")
 def cyclists(driven):
     """Rows in which the ego passes a cyclist, on a road whose corridor is known."""

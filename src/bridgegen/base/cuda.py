@@ -40,7 +40,7 @@ def library() -> Any:
     """Return the driver.
 
     Raises:
-        InputError: there is none.
+        InputError: this machine has no driver of NVIDIA's.
     """
     name = "nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1"
     try:

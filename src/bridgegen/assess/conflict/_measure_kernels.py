@@ -194,7 +194,8 @@ def _course(which, steps, facts, measuring, verdict, distance, out):
 @kernel
 def _perceive(which, steps, facts, measuring, record, out):
     """Write a metric of perception."""
-    x, y, h, seen = record.x[None], record.y[None], record.h[None], record.detections[None]
+    x, y, h = record.x[None], record.y[None], record.h[None]
+    seen = record.detections[: len(record.x)][None]  # ghosts come after the participants
     cosine, sine = headings(steps[0], record)
     centre_x, centre_y = np.empty(x.shape), np.empty(x.shape)
     counts = np.empty(x.shape, np.bool_)

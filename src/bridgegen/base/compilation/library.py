@@ -6,7 +6,7 @@ it lies, as a symbol of its own; only small ones are linked, to be inlined. Mach
 generated where Python calls in, for the kernel and all that it calls.
 
 The code of a kernel of this package lies in the cache by its symbol, which is the same in every
-process: `CodeStore`.
+process: `CodeStore`. It lies there as it was lowered, too, for `whole`.
 """
 
 import hashlib
@@ -102,6 +102,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         self.symbol = ""
         self.callees: tuple[str, ...] = ()
         self._bitcode, self._object = b"", b""
+        self._lowered: tuple[tuple[str, ...], bytes] = (), b""
         self._is_loaded = False
         self.enable_object_caching()
 
@@ -147,15 +148,25 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         """Link what is small; see the base class."""
         callees: dict[str, None] = {}
         linked = []
+        called = []
         for library in self._linking_libraries:
             if isinstance(library, KernelLibrary):
+                if library.symbol:
+                    called.append(library.symbol)
                 if library.is_large:
                     callees[library.symbol] = None
                     continue
                 # A kernel that is linked leaves the large ones that it calls to its caller.
                 callees |= dict.fromkeys(library.callees)
             linked.append(library)
-        self._linking_libraries, self.callees = linked, tuple(callees)
+        self.callees = tuple(callees)
+        if self.is_stored:
+            mine = [library for library in linked if not getattr(library, "symbol", "")]
+            for library in dict.fromkeys(mine):
+                self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+            self._lowered = tuple(called), self._final_module.as_bitcode()
+            linked = [library for library in linked if library not in mine]
+        self._linking_libraries = linked
         super().finalize()
 
     def _finalize_final_module(self) -> None:
@@ -169,6 +180,8 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
             )
             self.by_symbol[self.symbol] = self
             self.store.write(self.symbol, "bc", (self.callees, self._bitcode, self.is_inlined))
+            self.store.write(self.symbol, "raw", self._lowered)
+            self._lowered = (), b""
 
     def _get_module_for_linking(self) -> Any:
         self._parse()

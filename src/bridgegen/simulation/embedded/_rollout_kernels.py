@@ -8,7 +8,7 @@ Both ways run the same functions on the same arrays, so they give the same bits.
 
 from numba import float64, int64
 
-from bridgegen.base.compiled import bundled, bundled_row, inlined_kernel, kernel
+from bridgegen.base.compiled import bundled, bundled_row, inlined_kernel, kernel, run_kernel_at
 from bridgegen.simulation.embedded._instant_kernels import (
     after_driver,
     before_driver,
@@ -29,6 +29,16 @@ def simulate_rows(plan, networks, rows, states, records):
     for i in range(len(rows)):
         roads = bundled_row(networks, rows[i])
         simulate_row(plan, roads, bundled_row(states, i), bundled_row(records, i))
+
+
+@kernel
+def simulate_rows_at(address, plan, networks, rows, states, records):
+    """Do as `simulate_rows` with ``simulate_row`` at an address; see `whole`."""
+    plan = bundled(plan)
+    for i in range(len(rows)):
+        roads = bundled_row(networks, rows[i])
+        row = plan, roads, bundled_row(states, i), bundled_row(records, i)
+        run_kernel_at(address, row)
 
 
 @inlined_kernel

@@ -1,6 +1,7 @@
 """N rows of one compiled storyboard: set up, rolled out at once, or by one instant at a time."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -27,7 +28,7 @@ from bridgegen.drivers.user_drivers import Traits
 from bridgegen.drivers.views import frames
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
-from bridgegen.simulation.embedded import drivers
+from bridgegen.simulation.embedded import drivers, whole
 from bridgegen.simulation.embedded._codes import (
     CLOSELY,
     COURSE_MEMORY,
@@ -132,14 +133,14 @@ class Batch:
         at = here(self.plan, self._roads.tables, self.state, self.record)
         self.plan = addressed(self.plan, drives, at)
 
-    def run(self, simulate_rows: Callable[..., Any] = kernels.simulate_rows) -> Rollout:
+    def run(self, simulate_rows: Callable[..., Any] | None = None) -> Rollout:
         """Roll all rows out with the compiled driver; runs without the GIL.
 
         Args:
-            simulate_rows: that kernel, or what has it called elsewhere, and returns messages by
-                row.
+            simulate_rows: has the kernel of that name called elsewhere, and returns messages by
+                row; by default it, or code that does the same, is called here.
         """
-        self._do(simulate_rows)
+        self._do(simulate_rows or partial(whole.simulate_rows, self._program))
         return self.rollout()
 
     def start(self) -> None:
@@ -505,8 +506,8 @@ def taken(rows: Rows, some: Int) -> Rows:
 def put_back(rows: Rows, part: Rows, some: Int) -> None:
     """Overwrite some of the rows."""
     arrays: Any = rows
-    for whole, array in zip(arrays, part, strict=True):
-        whole[some] = array
+    for rows_of_all, array in zip(arrays, part, strict=True):
+        rows_of_all[some] = array
 
 
 def starts_of(program: Program, roads: Network, rows: Int, slots: Float) -> tuple[Float, Float]:
