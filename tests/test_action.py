@@ -11,6 +11,8 @@ import pytest
 import yaml
 from tests.approval import approve
 
+pytestmark = pytest.mark.thorough
+
 ROOT = Path(__file__).parents[1]
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text("utf-8"))
 STEPS = ACTION["runs"]["steps"]

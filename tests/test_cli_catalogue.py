@@ -21,6 +21,7 @@ def few(monkeypatch):
     monkeypatch.setattr(reader, "names", chosen)
 
 
+@pytest.mark.thorough
 def test_the_catalogue_is_searched_resumed_and_weighed(cli, few, tmp_path, monkeypatch, same_rows):
     monkeypatch.chdir(tmp_path)
     words = ("search", "--catalogue", "--ego", "route-follower", *QUICK)
@@ -51,6 +52,7 @@ def test_the_catalogue_is_searched_resumed_and_weighed(cli, few, tmp_path, monke
     assert err.count("was begun with these other options") == 4
 
 
+@pytest.mark.thorough
 def test_a_failure_condition_that_holds_ends_all_with_its_status(cli, few, tmp_path):
     code, out, _ = cli(
         "search", "--catalogue", "--ego", "route-follower", *QUICK, "--fail-if", "critical > 0",

@@ -43,6 +43,7 @@ def test_there_is_a_test_for_each():
     assert sorted(one.stem for one in FOLDER.glob("*.ipynb")) == NAMES
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", NAMES)
 def test_a_notebook_prints_what_it_shows(make, name, tmp_path, monkeypatch):
     """Otherwise: python docs/make_notebooks.py."""

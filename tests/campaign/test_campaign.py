@@ -181,6 +181,7 @@ def test_causes_can_be_left_out(tmp_path):
     assert not (tmp_path / "other").exists()
 
 
+@pytest.mark.thorough
 @pytest.mark.checkers
 @pytest.mark.parametrize("name", ["crossroads-s1", "crossroads-s2", "crossroads-s3"])
 def test_strangers_accept_what_is_handed_over(tmp_path, name, checkers):

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 from tests.approval import approve, refuses
 
 from bridgegen import resume, run_search
@@ -54,6 +55,7 @@ def run_criterion(run):
     return run.criteria[0].criterion
 
 
+@pytest.mark.thorough
 def test_the_same_bits_after_an_interruption_and_with_processes(tmp_path):
     search = {"criteria": [GAP], "budget": 120, "keep": 1, "triage": "none", **GIVEN}
     whole = run_search("cut-in", **search, out=tmp_path / "a")

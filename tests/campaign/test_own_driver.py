@@ -29,6 +29,7 @@ def search(tmp_path, name, budget=30, file=DRIVERS, triage="none", **kwargs):
     )
 
 
+@pytest.mark.thorough
 def test_a_search_outlives_its_driver(tmp_path):
     run = search(tmp_path, "FailsFast", triage="short")
     assert 0 < run.summary.failed < run.summary.evaluations == 30

@@ -46,6 +46,7 @@ def test_findings_are_evaluated_again(run):
     assert "fails in" in run.triage.doubts(next(i.evaluation for i in again if not i.agrees))
 
 
+@pytest.mark.thorough
 def test_counts_are_the_same_with_workers_and_after_a_resume(run, tmp_path):
     other = search(tmp_path / "other", workers=2)
     assert other.triage == run.triage

@@ -65,6 +65,7 @@ def test_processes_find_what_threads_find_whoever_is_killed(
     assert not pool.pids
 
 
+@pytest.mark.thorough
 def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
     monkeypatch.syspath_prepend(str(DOUBLES))
     from poisoned import Poisoned
@@ -91,6 +92,7 @@ def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
     assert np.isfinite(found.F).all()
 
 
+@pytest.mark.thorough
 def test_a_driver_of_ones_own_is_made_in_each_process(tmp_path, same_rows):
     search = {
         "scenario": "crossroads-s1",

@@ -93,6 +93,7 @@ def test_wrong_and_different_are_two_words(cli, suite_of, tmp_path):
     assert [one["passed"] for one in json.loads(out)["results"]] == [True, False, False]
 
 
+@pytest.mark.thorough
 def test_a_wrong_answer_is_the_first_thing_that_the_dossier_says(
     suite_of, made, tmp_path, recomputed
 ):

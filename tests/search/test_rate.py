@@ -113,6 +113,7 @@ def test_all_rows_or_none_harmful(happens):
         assert found.high == pytest.approx(3.0 / 30.0)  # rule of three, of rows as on the road
 
 
+@pytest.mark.thorough
 def test_a_rate_is_the_same_after_a_stop(tmp_path, cli, same_rows):
     def stop(progress: Progress) -> None:
         if progress.evaluations >= 60:
@@ -152,6 +153,7 @@ def test_what_cannot_be_rated_is_refused(tmp_path):
     assert not (tmp_path / "a").exists()
 
 
+@pytest.mark.thorough
 def test_it_ends_when_interval_and_modes_suffice(tmp_path, monkeypatch):
     monkeypatch.setattr(searcher, "LEAST_RATED", 60)
     given = {"ego": "route-follower", "exposure": EXAMPLE, "budget": 200, "triage": "none"}

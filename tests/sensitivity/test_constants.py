@@ -106,6 +106,7 @@ def test_a_constant_of_the_verdict_reaches_the_analysis_and_nothing_else(constan
     assert {value for _, value in changed} <= {constant.high, "table"}
 
 
+@pytest.mark.thorough
 def test_the_careful_drivers_reaction_time_decides_what_is_preventable(cut_out):
     """A slower careful driver avoids less, never more; so fewer contacts count as preventable."""
     X = rows_of(cut_out, 300)

@@ -88,6 +88,7 @@ def test_a_search_in_carla(cli, machine, tmp_path):
     store.close()
 
 
+@pytest.mark.thorough
 def test_what_was_found_is_confirmed_and_simulated_in_carla(cli, machine, tmp_path):
     """A search here; its scenarios there, by CARLA's physics; and one of them by its file."""
     import json

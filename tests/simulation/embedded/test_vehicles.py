@@ -132,6 +132,7 @@ def test_an_exported_file_states_it_and_does_the_same(vehicle, tmp_path):
     assert vehicle not in str(with_vehicle(read(text.encode(), "one.xosc"), "kinematic"))
 
 
+@pytest.mark.thorough
 def test_a_run_records_it_and_resumes_with_it(tmp_path):
     given = {"ego": "route-follower", "budget": 20, "algorithm": "random", "keep": 1}
     run = bg.run_search(

@@ -33,6 +33,8 @@ from ..embedded.storyboards import (
     start,
 )
 
+pytestmark = pytest.mark.thorough
+
 LOGS, REFUSES, HANGS, DIES, NAN, HANGS_AT_ONCE = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # see the stand-in
 TEXT = scenario(
     ("ego", "bv"),
