@@ -1,7 +1,7 @@
 """Rows of one storyboard in code of its own, once so many run that its compilation pays.
 
 The code of all storyboards reads from tables what a storyboard consists of, and how large its
-arrays are. Code in which these are constants takes two thirds of the time, and some seconds to
+arrays are. Code in which these are constants takes 0.5 to 0.7 of the time, and some seconds to
 compile: another process does so while rows run. It gives the same bits, so it does not matter when,
 or whether, it comes.
 """
@@ -36,8 +36,8 @@ from bridgegen.simulation.embedded.addresses import CALLED, FIELDS, addressed
 from bridgegen.simulation.embedded.drivers import DEMANDS
 from bridgegen.simulation.embedded.program import Program
 
-SAVED = 1 / 3
-"""Share of the time of a row that code of its own saves; see docs/decisions/speed.md."""
+SAVED = 0.4
+"""Share of the time of a rollout that code of its own saves: see docs/decisions/speed.md."""
 
 COST = 8.0
 """Processor time of a compilation, until one was measured here [s]."""
