@@ -38,7 +38,7 @@ START_SECONDS = 300.0
 MEMORY = 2**30
 """Bytes that a process may grow by."""
 
-XML = (".xosc", ".xodr", ".owl")
+XML = (".xosc", ".xodr", ".owl", ".osm")
 
 NASTY = (
     "", " ", "0", "-1", "1", "1e308", "-1e308", "1e-320", "NaN", "INF", "-inf", "Infinity", "0x10",
@@ -177,12 +177,48 @@ def _recording(seed: Seed, folder: Path) -> None:
     measure_recording(path)
 
 
+def _lanelets(seed: Seed, folder: Path) -> None:
+    from bridgegen.openx.opendrive.read import read
+    from bridgegen.openx.opendrive.road_map import map_bytes
+    from bridgegen.openx.opendrive.validate import problems
+
+    path = folder / "mutated.osm"
+    path.write_bytes(seed.data)
+    problems(read(map_bytes(path), path.name))
+
+
+def _dsl(seed: Seed, folder: Path) -> None:
+    from bridgegen.engine.pipeline import Pipeline
+    from bridgegen.scenario.language.reader import load
+
+    path = folder / "mutated.osc"
+    path.write_bytes(seed.data)
+    scenario = load(path)
+    Pipeline(scenario, scenario.space())
+
+
+def _tier4(seed: Seed, folder: Path) -> None:
+    (folder / "town_map" / "map").mkdir(parents=True)
+    (folder / "town_map" / "map" / "lanelet2_map.osm").write_bytes(
+        (seed.beside / "two_way.osm").read_bytes()
+    )
+    from bridgegen.openx.openscenario.read import read
+    from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+
+    path = folder / "mutated.yaml"
+    path.write_bytes(seed.data)
+    EmbeddedSimulator(read(path), path.name)
+
+
 READERS: dict[str, Callable[[Seed, Path], None]] = {
     ".xosc": _scenario,
     ".xodr": _roads,
     ".owl": _individuals,
     ".yaml": _logical,
     ".csv": _recording,
+    ".osm": _lanelets,
+    ".osc": _dsl,
+    ".tier4": _tier4,
 }
 
 
@@ -212,6 +248,19 @@ def write_ours(folder: Path) -> None:
         text = resources.files("bridgegen.scenario.catalogue").joinpath(f"{name}.yaml").read_bytes()
         (folder / f"{name}.yaml").write_bytes(text)
         write_trace(folder / f"{name}.csv", pipeline.rollout(space.row({})[None]))
+    root = Path(__file__).parents[1]
+    sys.path.append(str(root))
+    from tests.openx.lanelet2.test_lanelet2 import LANES, TWO_WAY, arc, crossroads, osm
+    from tests.openx.openscenario.test_tier4 import SCENARIO
+
+    (folder / "two_way.osm").write_text(osm(TWO_WAY, LANES))
+    (folder / "crossroads.osm").write_text(crossroads())
+    (folder / "bend.osm").write_text(
+        osm({1: arc(4, 1.4, 60), 2: arc(7.5, 1.4, 60)}, [(11, 1, 2, {})])
+    )
+    (folder / "scenario.tier4").write_text(SCENARIO)
+    for example in (root / "docs" / "examples").glob("*.osc"):
+        (folder / example.name).write_bytes(example.read_bytes())
     log = Path(__file__).parent / "simulation" / "data" / "esmini_log.csv"
     (folder / log.name).write_bytes(log.read_bytes())
 

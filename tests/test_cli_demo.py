@@ -2,12 +2,14 @@
 
 import webbrowser
 
+import pytest
 from tests.approval import approve
 
 import bridgegen as bg
 from bridgegen.cli import demo
 
 
+@pytest.mark.thorough
 def test_it_finds_failures_and_opens_the_page(cli, tmp_path, monkeypatch):
     opened = []
     monkeypatch.chdir(tmp_path)

@@ -29,6 +29,7 @@ def search(folder: Path, name: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["Forks", "Daemonises"])
 def test_a_process_that_outlives_its_driver_holds_no_search_up(started, tmp_path_factory, name):
     folder = tmp_path_factory.mktemp("search")

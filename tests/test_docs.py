@@ -34,6 +34,7 @@ def test_the_catalogue_is_up_to_date(make):
     assert (DOCS / "catalogue.md").read_text("utf-8") == make.catalogue()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", names())
 def test_every_scenario_has_its_picture(make, name):
     """The same as drawn now, but for the last digit of a pixel: other machines round otherwise."""

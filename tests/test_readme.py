@@ -29,6 +29,7 @@ def test_readme_is_short_and_says_what_a_command_prints():
     assert len(commands()) >= 10
 
 
+@pytest.mark.thorough
 def test_the_output_is_what_the_main_job_prints(tmp_path, monkeypatch, capsys):
     """But for the times of this machine."""
     (shown,) = re.findall(r"```text\n(FAILS .*?)```", README, re.DOTALL)

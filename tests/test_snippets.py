@@ -62,7 +62,7 @@ SHORT = {
 Pages ``AS_PRINTED`` and ``TRIAGED`` triage; each other search would take twice as long with it.
 """
 
-TRIAGED = ("credibility", "dashboard", "read-a-report", "suites")
+TRIAGED = ("credibility", "dashboard", "read-a-report", "suites", "tutorial")
 """Pages whose later commands need the failure modes of a search."""
 
 FEW = {
@@ -80,8 +80,7 @@ COARSE = {
 
 AS_PRINTED = (
     "estimate-risk", "failure-modes", "mine-recordings", "python-guide", "regions", "run-a-suite",
-    "safety-case", "search-a-file", "sensitivity", "team", "test-my-driver", "tutorial",
-    "write-a-scenario",
+    "safety-case", "search-a-file", "sensitivity", "team", "test-my-driver", "write-a-scenario",
 )  # fmt: skip
 """Pages whose commands are run exactly as they are printed, and whose output is compared."""
 

@@ -57,6 +57,7 @@ def variants():
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("arguments", list(variants()))
 def test_a_handed_over_file_gives_the_store_s_metrics_to_the_last_bit(tmp_path, arguments):
     run = bg.run_search(**arguments, budget=100, keep=3, triage="none", out=tmp_path / "run")

@@ -72,6 +72,7 @@ def test_a_driver_outside_its_domain_is_named(scenario, ego, said):
     assert not found or found.startswith(f"outside the domain of {ego} (motorway): {scenario} has")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("scenario", "ego", "ideal", "sees_the_truth"),
     [

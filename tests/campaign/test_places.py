@@ -143,6 +143,7 @@ def test_all_junctions_are_one_search_space(crossroads: Path) -> None:
             np.testing.assert_array_equal(getattr(rollout, name)[rows], getattr(other, name))
 
 
+@pytest.mark.thorough
 def test_what_a_town_s_search_exports_keeps_its_constraints(
     crossroads: Path, tmp_path: Path
 ) -> None:

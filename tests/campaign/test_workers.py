@@ -40,6 +40,7 @@ def undisturbed(tmp_path_factory):
     return bg.run_search(**SEARCH, out=tmp_path_factory.mktemp("threads") / "run")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("count", [1, 3])
 def test_processes_find_what_threads_find_whoever_is_killed(
     undisturbed, tmp_path, count, same_rows
@@ -150,6 +151,7 @@ def gone(pids: set[int], seconds: float) -> bool:
     return True
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_processes_end_with_the_search_however_it_ends(tmp_path, how):
     process = start(tmp_path / "run")

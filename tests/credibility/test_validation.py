@@ -117,6 +117,7 @@ def test_a_wrong_answer_is_the_first_thing_that_the_dossier_says(
     assert [line.split()[1] for line in lines] == ["all.cases_wrong"]
 
 
+@pytest.mark.thorough
 def test_a_dossier_without_the_suite_says_so(made, tmp_path):
     found = bg.export_credibility([made["clean"]], out=tmp_path)
     (item,) = (item for item in found.dossier.items if item.id == "5.4")

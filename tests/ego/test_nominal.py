@@ -22,6 +22,7 @@ ROUND = {
 """By scenario: the drivers that pass somebody by another lane, and on which side (1 left)."""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("ideal", IDEAL)
 @pytest.mark.parametrize("name", names())
 def test_defaults_are_driven_without_harm(name: str, ideal: str) -> None:

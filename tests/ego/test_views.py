@@ -21,6 +21,7 @@ def shown(request):
     return watched(request.param, interface.WANTS, n=3)
 
 
+@pytest.mark.thorough
 def test_the_lanes_are_those_of_the_map(shown):
     """The lane beside is where the map has it, and its marking allows what the map says."""
     for o in shown.seen[::40]:

@@ -41,6 +41,7 @@ def test_a_scenario_names_its_clause_and_runs_are_named_after_it(name):
     assert re.search(r"UN Regulation No\. 157.*(Annex 5|5\.2\.5)", scenario.source)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", R157)
 def test_the_traffic_of_random_rows_could_happen(name):
     _, parts = rollouts(name, "route-follower")

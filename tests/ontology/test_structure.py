@@ -32,6 +32,7 @@ def shacl_alone(monkeypatch, individuals, scenario):
         return check(individuals, scenario)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", names())
 def test_shacl_is_not_asked_of_what_is_right(name, monkeypatch):
     monkeypatch.setattr(checks._Compiled, "validate", lambda *_: pytest.fail("it was asked"))
@@ -74,6 +75,7 @@ def mutated(quads, rng):
     return Individuals(quads)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("given", [SCENARIO, None])
 def test_a_mutant_has_the_violations_that_shacl_finds(given, monkeypatch):
     """Not less of them where the answer comes without pyshacl, and not more."""

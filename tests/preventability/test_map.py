@@ -112,6 +112,7 @@ def test_a_driver_alone_has_the_same_classes(whole, tmp_path):
     np.testing.assert_array_equal(alone.classes["route-follower"], whole.classes["route-follower"])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("size", "workers"), [(7, None), (64, 2)])
 def test_neither_chunks_nor_workers_change_a_bit(whole, tmp_path, monkeypatch, size, workers):
     monkeypatch.setattr(chunks, "CHUNK", size)

@@ -63,6 +63,7 @@ def made(scenario, **options):
     return Pipeline(logical, logical.space(), PipelineOptions(**options))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("scenario", "options", "other"),
     [
@@ -108,6 +109,7 @@ def test_files_that_differ_in_more_are_refused_with_the_reason():
     assert "differ" in found["refused"]
 
 
+@pytest.mark.thorough
 def test_scenarios_of_the_catalogue_that_are_simulated_in_pages_are_saved():
     for name in covering():
         found = simulation_payload(made(name))

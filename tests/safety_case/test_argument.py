@@ -41,6 +41,7 @@ def argued(request, cases):
     return cases[request.param].case
 
 
+@pytest.mark.thorough
 def test_relations_are_those_that_the_notation_has(argued):
     kinds = {one.id: one.kind for one in argued.elements}
     for one in argued.relations:

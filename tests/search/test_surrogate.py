@@ -233,6 +233,7 @@ for name in ("turbo", "surrogate"):
 """
 
 
+@pytest.mark.thorough
 def test_the_number_of_threads_of_linear_algebra_does_not_matter():
     told = []
     for n in ("1", "2"):

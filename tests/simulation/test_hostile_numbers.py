@@ -60,6 +60,7 @@ def test_the_file_is_valid_and_runs(folder):
     assert simulate_file(path).status == "ok"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("place", PLACES)
 def test_validate_and_simulate_agree(folder, place):
     whole = text()

@@ -211,6 +211,7 @@ def test_other_variations_are_not_compared():
     assert (of_a["beside"], of_b["beside"]) == (["p-"], ["-p"])
 
 
+@pytest.mark.thorough
 def test_a_thousand_entries_with_many_variations_fit():
     """Numbers that nothing compresses; each entry keeps its worst."""
     rng = np.random.default_rng(0)

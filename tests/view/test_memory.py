@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from bridgegen.jobs.search import Run
 from bridgegen.jobs.search.restored import pipeline_of
@@ -44,6 +45,7 @@ def peak(run):
         tracemalloc.stop()
 
 
+@pytest.mark.thorough
 def test_memory_a_row_of_a_page(finished, tmp_path, monkeypatch):
     monkeypatch.setattr(payload, "ROWS", 500)
     monkeypatch.setattr(payload, "SIZE_OF_ROW", 0)  # no motions

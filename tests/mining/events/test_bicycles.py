@@ -22,6 +22,7 @@ def right_turn(lead=0.0, speed=4.0):
     )
 
 
+@pytest.mark.thorough
 def test_a_right_turn_across_the_way_of_a_bicycle():
     """The bicycle is 4 m ahead at first; it passes where they cross 3.4 s after the car."""
     turned = np.arccos(0.75)

@@ -47,6 +47,7 @@ def test_once_is_enough(scenario):
         assert orientation.type is not None
 
 
+@pytest.mark.thorough
 @pytest.mark.checkers
 @pytest.mark.parametrize(("version", "xsd"), [("1.2", "1.2.0"), ("1.3", "1.3.0")])
 def test_whatever_the_model_holds_is_valid_by_the_version_s_schema(checkers, version, xsd):

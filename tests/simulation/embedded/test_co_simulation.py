@@ -56,6 +56,7 @@ def test_alone_it_is_the_embedded_simulator_to_the_bit(scenario, ego):
         np.testing.assert_array_equal(getattr(alone, name), getattr(expected, name), name)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("scenario", "ego"), [("cut-in", "reference"), ("crossroads-s4", "careful")]
 )

@@ -6,7 +6,7 @@ it lies, as a symbol of its own; only small ones are linked, to be inlined. Mach
 generated where Python calls in, for the kernel and all that it calls.
 
 The code of a kernel of this package lies in the cache by its symbol, which is the same in every
-process: `CodeStore`. It lies there as it was lowered, too, for `whole`.
+process: `CodeStore`. It lies there as it was lowered, too, for `whole_program`.
 """
 
 import hashlib

@@ -93,7 +93,7 @@ class Calls:
             f"dns:///{host}:{address.port}",
             [
                 ("grpc.max_receive_message_length", MAX_FRAME),
-                ("grpc.enable_http_proxy", 0),  # nobody but who is named is connected to
+                ("grpc.enable_http_proxy", 0),  # it connects to the named host, through no proxy
                 ("grpc.use_local_subchannel_pool", 1),  # a new one connects at once
                 ("grpc.enable_retries", 0),
             ],

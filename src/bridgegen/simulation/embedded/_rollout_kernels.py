@@ -33,7 +33,7 @@ def simulate_rows(plan, networks, rows, states, records):
 
 @kernel
 def simulate_rows_at(address, plan, networks, rows, states, records):
-    """Do as `simulate_rows` with ``simulate_row`` at an address; see `whole`."""
+    """Do as `simulate_rows` with ``simulate_row`` at an address; see `specialised`."""
     plan = bundled(plan)
     for i in range(len(rows)):
         roads = bundled_row(networks, rows[i])

@@ -28,7 +28,7 @@ from bridgegen.drivers.user_drivers import Traits
 from bridgegen.drivers.views import frames
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
-from bridgegen.simulation.embedded import drivers, whole
+from bridgegen.simulation.embedded import drivers, specialised
 from bridgegen.simulation.embedded._codes import (
     CLOSELY,
     COURSE_MEMORY,
@@ -140,7 +140,7 @@ class Batch:
             simulate_rows: has the kernel of that name called elsewhere, and returns messages by
                 row; by default it, or code that does the same, is called here.
         """
-        self._do(simulate_rows or partial(whole.simulate_rows, self._program))
+        self._do(simulate_rows or partial(specialised.simulate_rows, self._program))
         return self.rollout()
 
     def start(self) -> None:

@@ -63,7 +63,7 @@ def machine_code(
     early.add_sroa_pass()
     early.add_instruction_combine_pass()
     early.run(module, codegen._module_pass_manager()[1])
-    text = "\n".join(specialised(str(module).split("\n"), known))
+    text = "\n".join(with_constants(str(module).split("\n"), known))
     # Counting references to memory that has no owner comes to nothing once it is inlined.
     text = re.sub(
         r"^(define [^@\n]*@NRT_(?:inc|dec)ref\([^\n]*?)(?: #\d+)? \{",
@@ -96,7 +96,7 @@ def _lowered(roots: Iterable[str]) -> Iterator[bytes]:
         yield code
 
 
-def specialised(lines: Iterable[str], known: Mapping[str, Constants]) -> Iterator[str]:
+def with_constants(lines: Iterable[str], known: Mapping[str, Constants]) -> Iterator[str]:
     """Yield LLVM's IR with constants where a parameter that is a bundle is read.
 
     A load that has another form than these stays one, and reads the same.

@@ -1,4 +1,4 @@
-"""Code of a storyboard's own: the same bits, and never in the way."""
+"""Code specialised to a storyboard: the same bits, and never in the way."""
 
 import time
 
@@ -7,18 +7,18 @@ import pytest
 from numba.core.registry import cpu_target
 
 from bridgegen.base.compilation.library import KernelLibrary, MissingCodeError
-from bridgegen.base.compilation.whole import machine_code, specialised
+from bridgegen.base.compilation.whole_program import machine_code, with_constants
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
-from bridgegen.simulation.embedded import whole
+from bridgegen.simulation.embedded import specialised
 
 
 @pytest.fixture(autouse=True)
 def nothing_known(monkeypatch):
-    monkeypatch.setattr(whole, "_KNOWN", type(whole._KNOWN)())
-    monkeypatch.setattr(whole, "_COMPILING", [])
+    monkeypatch.setattr(specialised, "_KNOWN", type(specialised._KNOWN)())
+    monkeypatch.setattr(specialised, "_COMPILING", [])
 
 
 def batches(name, ego, n=40, **how):
@@ -56,7 +56,7 @@ def nothing_stored(monkeypatch):
     read, keep = store.read, store.write
 
     def is_program(symbol):
-        return symbol.startswith("whole")
+        return symbol.startswith("specialised")
 
     def found(here, symbol, kind):
         return written.get((symbol, kind)) if is_program(symbol) else read(here, symbol, kind)
@@ -69,22 +69,22 @@ def nothing_stored(monkeypatch):
 
     monkeypatch.setattr(store, "read", found)
     monkeypatch.setattr(store, "write", write)
-    monkeypatch.setattr(whole, "WORTHWHILE", 0.0)
+    monkeypatch.setattr(specialised, "WORTHWHILE", 0.0)
     return written
 
 
-def own(make, monkeypatch):
-    """Run with code of the storyboard's own, compiled here."""
-    monkeypatch.setattr(whole, "COST", np.inf)
+def in_specialised_code(make, monkeypatch):
+    """Run with code specialised to the storyboard, compiled here."""
+    monkeypatch.setattr(specialised, "COST", np.inf)
     for _ in range(3):  # the second one asks whether there is code
         make().run()
     codegen = cpu_target.target_context.codegen()
-    for storyboard in whole._KNOWN.values():
+    for storyboard in specialised._KNOWN.values():
         if storyboard.job and not storyboard.address:
             storyboard.code = machine_code(codegen, *storyboard.job)
     batch = make()
     batch.run()
-    assert list(whole._KNOWN.values())[-1].address
+    assert list(specialised._KNOWN.values())[-1].address
     return bits(batch)
 
 
@@ -92,10 +92,11 @@ def differing(mine, wanted):
     return [name for name in wanted if mine[name] != wanted[name]]
 
 
+@pytest.mark.thorough
 def test_storyboards_have_the_same_bits_beside_each_other(monkeypatch, nothing_stored):
     for name in ("crossroads-s4", "crossroads-s1"):
         (make,) = batches(name, "route-follower")
-        assert not differing(own(make, monkeypatch), generic(make))
+        assert not differing(in_specialised_code(make, monkeypatch), generic(make))
 
 
 @pytest.mark.thorough
@@ -113,36 +114,36 @@ def test_storyboards_have_the_same_bits_beside_each_other(monkeypatch, nothing_s
 )
 def test_the_same_bits_whatever_runs(monkeypatch, nothing_stored, name, ego, how):
     make = next(iter(batches(name, ego, **how)))
-    assert not differing(own(make, monkeypatch), generic(make))
+    assert not differing(in_specialised_code(make, monkeypatch), generic(make))
 
 
 def test_another_process_compiles_it_while_rows_run(monkeypatch, nothing_stored):
     (make,) = batches("crossroads-s4", "route-follower", 8)
     wanted = generic(make)
-    monkeypatch.setattr(whole, "COST", 0.0)
+    monkeypatch.setattr(specialised, "COST", 0.0)
     until = time.monotonic() + 300.0
-    while not (whole._KNOWN and next(iter(whole._KNOWN.values())).address):
+    while not (specialised._KNOWN and next(iter(specialised._KNOWN.values())).address):
         assert time.monotonic() < until
         batch = make()
         batch.run()
         assert not differing(bits(batch), wanted)
         time.sleep(0.05)
-    assert nothing_stored["whole", "seconds"] > 0.0
+    assert nothing_stored["specialised", "seconds"] > 0.0
     # The next process finds it.
-    whole._KNOWN.clear()
-    monkeypatch.setattr(whole, "Child", None)
+    specialised._KNOWN.clear()
+    monkeypatch.setattr(specialised, "Child", None)
     for _ in range(4):
         make().run()
-    (storyboard,) = whole._KNOWN.values()
+    (storyboard,) = specialised._KNOWN.values()
     assert storyboard.address
 
 
 def test_few_rows_have_nothing_compiled(monkeypatch):
-    monkeypatch.setattr(whole, "Child", None)
+    monkeypatch.setattr(specialised, "Child", None)
     (make,) = batches("crossroads-s4", "route-follower", 8)
     for _ in range(3):
         make().run()
-    (storyboard,) = whole._KNOWN.values()
+    (storyboard,) = specialised._KNOWN.values()
     assert storyboard.job is None
 
 
@@ -156,9 +157,9 @@ def test_without_code_rows_run_on(monkeypatch, nothing_stored, program):
         started.append(process := start(program, take, errors=errors))
         return process
 
-    start = whole.Child
-    monkeypatch.setattr(whole, "Child", child)
-    monkeypatch.setattr(whole, "COST", 0.0)
+    start = specialised.Child
+    monkeypatch.setattr(specialised, "Child", child)
+    monkeypatch.setattr(specialised, "COST", 0.0)
     for _ in range(6):
         batch = make()
         batch.run()
@@ -166,7 +167,7 @@ def test_without_code_rows_run_on(monkeypatch, nothing_stored, program):
     assert len(started) == 1  # it is not tried again
     started[0].end()
     make().run()
-    assert not whole._COMPILING
+    assert not specialised._COMPILING
 
 
 def test_a_kernel_whose_code_is_lost_is_said_to_be(nothing_stored):
@@ -191,12 +192,12 @@ def test_only_what_is_known_of_a_bundle_is_a_constant():
     kind = "31Bundle_28Plan_2d6509fb201425_29"
     lines = IR.format(kind=kind).splitlines()
     known = {kind: {0: "double 0x3FF0000000000000", 16: "i64 3", 24: "double 0x0"}}
-    found = list(specialised(lines, known))
+    found = list(with_constants(lines, known))
     changed = {line for line in found if line not in lines}
     assert changed == {
         "  %.2 = add i64 3, 0",
         "  %.3 = select i1 true, double 0x3FF0000000000000, double 0x3FF0000000000000",
     }
-    assert list(specialised(lines, {kind.replace("31", "32"): known[kind]})) == lines
+    assert list(with_constants(lines, {kind.replace("31", "32"): known[kind]})) == lines
     two = [lines[0].replace(kind, 2 * kind), *lines[1:]]  # which of them, is not known
-    assert list(specialised(two, known)) == two
+    assert list(with_constants(two, known)) == two

@@ -1,9 +1,9 @@
-"""Rows of one storyboard in code of its own, once so many run that its compilation pays.
+"""Rows of one storyboard in code specialised to it, once so many run that its compilation pays.
 
-The code of all storyboards reads from tables what a storyboard consists of, and how large its
-arrays are. Code in which these are constants takes 0.5 to 0.7 of the time, and some seconds to
-compile: another process does so while rows run. It gives the same bits, so it does not matter when,
-or whether, it comes.
+Generic code, that of all storyboards, reads from tables what a storyboard consists of, and how
+large its arrays are. Code in which these are constants takes 0.5 to 0.7 of the time, and some
+seconds to compile: another process does so while rows run. It gives the same bits, so it does not
+matter when, or whether, it comes.
 """
 
 import hashlib
@@ -27,7 +27,7 @@ from numba.core.registry import cpu_target
 from bridgegen.base.arrays import Int
 from bridgegen.base.compilation.folder import cache_folder, digest
 from bridgegen.base.compilation.library import KernelLibrary
-from bridgegen.base.compilation.whole import machine_code
+from bridgegen.base.compilation.whole_program import machine_code
 from bridgegen.base.compiled import compile_for_kernels, row_type
 from bridgegen.base.processes.child import Child
 from bridgegen.simulation.embedded import _memory_kernels as memory
@@ -37,14 +37,14 @@ from bridgegen.simulation.embedded.drivers import DEMANDS
 from bridgegen.simulation.embedded.program import Program
 
 SAVED = 0.4
-"""Share of the time of a rollout that code of its own saves: see docs/decisions/speed.md."""
+"""Share of a rollout's processor time that specialised code saves: see docs/decisions/speed.md."""
 
 COST = 8.0
-"""Processor time of a compilation, until one was measured here [s]."""
+"""Processor time of a compilation, until one was measured on this machine [s]."""
 
 WORTHWHILE = 0.5
-"""Processor time of rows after which code that an earlier process had compiled is looked for [s]:
-the question itself takes a millisecond."""
+"""Processor time of rows after which the cache is asked for code of an earlier process [s]: the
+question takes a millisecond."""
 
 KEPT = 64
 """Number of storyboards that are remembered."""
@@ -87,7 +87,7 @@ def simulate_rows(
     states: memory.State,
     records: memory.Record,
 ) -> None:
-    """Do as ``_rollout_kernels.simulate_rows``, in the storyboard's own code if there is some."""
+    """Do as ``_rollout_kernels.simulate_rows``, in specialised code if there is some."""
     given = plan, networks, rows, states, records
     if numba.config.DISABLE_JIT:
         kernels.simulate_rows(*given)
@@ -122,8 +122,9 @@ def _consider(storyboard: _Storyboard, *bundles: Any) -> None:
         storyboard.job = _job(storyboard.program, *bundles)
         storyboard.code = store.read(storyboard.job[-1], "o") or b""
         return
-    # Who knows not how many rows will come loses at most as much again as the best choice costs.
-    cost = store.read("whole", "seconds") or COST
+    # How many rows will come is not known. Compiling once it would have paid takes at most twice as
+    # long as the best choice would.
+    cost = store.read("specialised", "seconds") or COST
     if _COMPILING or storyboard.seconds is None or storyboard.seconds * SAVED < cost:
         return
 
@@ -132,14 +133,14 @@ def _consider(storyboard: _Storyboard, *bundles: Any) -> None:
             assert storyboard.job is not None
             storyboard.code = message[1]
             store.write(storyboard.job[-1], "o", message[1])
-            store.write("whole", "seconds", message[2])
+            store.write("specialised", "seconds", message[2])
         elif message[0] == "died":
             _COMPILING.clear()
 
     storyboard.seconds = -np.inf  # once, whatever comes of it
-    # On without, where no process more is to be had.
+    # Where no further process can be started, rows go on as they are.
     with suppress(OSError), open(os.devnull, "wb") as nowhere:
-        child = Child(["-m", "bridgegen.base.compilation.whole"], take, errors=nowhere)
+        child = Child(["-m", "bridgegen.base.compilation.whole_program"], take, errors=nowhere)
         _COMPILING.append(child)
         child.send((cache_folder(), *storyboard.job))
 
@@ -162,7 +163,7 @@ def _load(storyboard: _Storyboard) -> None:
 
 
 def _job(program: Program, plan: memory.Plan, *rows: Any) -> tuple[Any, ...]:
-    """Return the arguments of `bridgegen.base.compilation.whole.machine_code`, but the first."""
+    """Return the arguments of `whole_program.machine_code`, but the first."""
     kinds = (row_type(plan, 0), *map(row_type, rows))
     called: list[str] = []
 
@@ -180,7 +181,7 @@ def _job(program: Program, plan: memory.Plan, *rows: Any) -> tuple[Any, ...]:
     }
     compiler = digest(Path(machine_code.__code__.co_filename))
     said = repr((compiler, root, called, known, tables)).encode()
-    return root, called, known, tables, f"whole_{hashlib.sha256(said).hexdigest()[:24]}"
+    return root, called, known, tables, f"specialised_{hashlib.sha256(said).hexdigest()[:24]}"
 
 
 def _constants(
