@@ -11,6 +11,7 @@ from tests.approval import approve, refuses
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.jobs.search.places import places_of
+from bridgegen.openx.lanelet2 import strips
 from bridgegen.openx.lanelet2.convert import lanelets_of
 from bridgegen.openx.lanelet2.read import read_lanelets, transverse_mercator
 from bridgegen.openx.opendrive.lanes import borders, lane_pose, points
@@ -229,6 +230,21 @@ def test_bounds_that_cross_are_refused(tmp_path: Path) -> None:
     ways = {1: straight(1.75), 2: [(10.0, -1.75), (60.0, 4.0), (110.0, -1.75)]}
     with refuses(FileFormatError, "lanelet 11", "must not cross"):
         model_of(tmp_path, osm(ways, [(11, 1, 2, {})]))
+
+
+def test_a_bound_of_hundreds_of_kilometres_is_refused(tmp_path: Path) -> None:
+    with refuses(FileFormatError, "lanelet 11", "20 km"):
+        model_of(tmp_path, osm({1: straight(3.5, end=9e5), 2: straight(0.0)}, [(11, 1, 2, {})]))
+
+
+def test_of_a_long_lane_only_arcs_nearby_are_looked_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bend = [(20.0 * k, round(30.0 * math.sin(k / 7), 3)) for k in range(60)]
+    text = osm({1: bend, 2: [(x, y - 3.5) for x, y in bend]}, [(11, 1, 2, {})])
+    every = model_of(tmp_path, text)
+    monkeypatch.setattr(strips, "MANY", 0)
+    assert model_of(tmp_path, text) == every
 
 
 def test_ways_may_be_drawn_in_any_direction(tmp_path: Path) -> None:

@@ -46,6 +46,7 @@ SPEED_WORDS = {
     "m/s": "m/s",
     "mph": "mph",
 }
+LONGEST = 2e4  # m, a bound of a lanelet
 LEAST_LOOP = 2.0  # m, along a bound that crosses itself
 BESIDE = 8.0  # m, between the middles of lanelets with traffic in both directions
 _MGRS = 1e5  # m, the side of a square of MGRS, in which Autoware's maps count
@@ -356,6 +357,15 @@ class _Reader:
                 self._wrong(
                     element,
                     f"lanelet {key} must have one {role} bound of two points or more, got {got}",
+                )
+                return None
+            steps = np.diff(way.points[:, :2], axis=0)
+            length = float(np.sum(np.sqrt(np.sum(steps * steps, axis=1))))
+            if length > LONGEST:
+                self._wrong(
+                    element,
+                    f"lanelet {key}: its {role} bound, way {way.id}, must not be longer than "
+                    f"{LONGEST / 1e3:g} km, and is {length / 1e3:,.1f} km long",
                 )
                 return None
             sides.append(way)

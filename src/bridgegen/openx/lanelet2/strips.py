@@ -13,12 +13,14 @@ from typing import TypeVar
 import numpy as np
 
 from bridgegen.base import elementary
-from bridgegen.base.arrays import Float
+from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.openx.lanelet2.read import Lanelet, Way
 from bridgegen.openx.opendrive.geometry import along_arc
 from bridgegen.openx.opendrive.plan_view import Arc, Cubic, Geometry, Line
 
 STEP = 0.05  # m, between two points of a border that its cubics are held against
+AT_ONCE = 4096  # points that are projected at once
+MANY = 2**23  # pairs of a point and an arc, up to which each is looked at
 TOLERANCE = 0.005  # m, of a border's cubics
 LEAST_CUBIC = 0.05  # m, length of the shortest of them
 SMOOTH = 2.0  # m to both sides, over which a reference line is smoothed
@@ -380,8 +382,32 @@ def _arcs(nodes: Float) -> Float:
 
 def _project(arcs: Float, points: Float) -> tuple[Float, Float]:
     """Return s and t of points beside arcs, before the start and beyond the end, too."""
+    starts = np.concatenate(([0.0], np.cumsum(arcs[:, 4])))[:-1]
+    every = np.arange(len(arcs))
+    # A lane of kilometres has 100,000 points and some hundred arcs: gigabytes, and minutes.
+    is_long = len(points) * len(arcs) > MANY
+    found = []
+    for k in range(0, len(points), AT_ONCE):
+        some = points[k : k + AT_ONCE]
+        near = _near(arcs, some) if is_long else every
+        found.append(_beside(arcs[near], starts[near], near == 0, near == every[-1], some))
+    s, t = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return s, t
+
+
+def _near(arcs: Float, points: Float) -> Int:
+    """Return which arcs may be the nearest one of some of the points."""
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    radius = float(np.max(np.sqrt(np.sum((points - middle) ** 2, axis=1))))
+    away = np.sqrt(np.sum((arcs[:, :2] - middle) ** 2, axis=1))
+    return np.flatnonzero(away - arcs[:, 4] <= away.min() + 2.0 * radius)
+
+
+def _beside(
+    arcs: Float, starts: Float, first: Bool, last: Bool, points: Float
+) -> tuple[Float, Float]:
+    """Return s and t of points beside arcs that start at ``starts``; see `_project`."""
     x, y, h, curvature, length = arcs.T
-    starts = np.concatenate(([0.0], np.cumsum(length)))[:-1]
     c, s = elementary.cos(h), elementary.sin(h)
     dx, dy = points[:, 0, None] - x, points[:, 1, None] - y
     along, across = dx * c + dy * s, dy * c - dx * s
@@ -400,8 +426,8 @@ def _project(arcs: Float, points: Float) -> tuple[Float, Float]:
     row = np.arange(len(points))
     inner = np.clip(
         u[row, which],
-        np.where(which == 0, -np.inf, 0.0),
-        np.where(which == len(arcs) - 1, np.inf, length[which]),
+        np.where(first[which], -np.inf, 0.0),
+        np.where(last[which], np.inf, length[which]),
     )
     return starts[which] + inner, t[row, which]
 

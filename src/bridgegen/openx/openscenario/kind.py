@@ -1,5 +1,6 @@
 """What an OpenSCENARIO file is, without reading all of it."""
 
+import os
 from pathlib import Path
 from typing import Literal
 
@@ -31,8 +32,9 @@ def files_named_in(path: Path) -> tuple[Path, ...]:
             ):
                 continue
             named = path.parent / text
-            some = sorted(named.glob("*.xosc")) if named.is_dir() else [named]
-            found.update(dict.fromkeys(item for item in some if item.is_file()))
+            # Of a name that is too long, they say "no", where those of Path raise.
+            some = sorted(named.glob("*.xosc")) if os.path.isdir(named) else [named]
+            found.update(dict.fromkeys(item for item in some if os.path.isfile(item)))
     return tuple(found)
 
 

@@ -245,7 +245,7 @@ def _on_roads(root: etree._Element, path: Path, place: str) -> None:
     if logic is None:
         return
     road = path.parent / logic.get("filepath", "")
-    road = road / "lanelet2_map.osm" if road.is_dir() else road
+    road = road / "lanelet2_map.osm" if os.path.isdir(road) else road
     logic.set("filepath", str(road))
     if road.suffix.lower() != ".osm":
         return
@@ -295,7 +295,7 @@ def _in_package(named: re.Match[str], path: Path, place: str) -> Path:
     roots = [Path(os.environ[ROOT])] if os.environ.get(ROOT) else []
     for folder in (*roots, *path.absolute().parents):
         for found in (folder / below, folder / "map" / below, folder / "openscenario" / below):
-            if found.exists():
+            if os.path.exists(found):  # "no" of a name that is too long, where Path raises
                 return found
     raise FileFormatError(
         f"{place}: the package {named[1]} is not near the file; --maps names the folder "
