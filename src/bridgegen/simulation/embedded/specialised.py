@@ -198,7 +198,7 @@ def _constants(
     """
     found: dict[int, str] = {}
     at = 0
-    for name, value in zip(bundle._fields, bundle, strict=True):
+    for name, value, held in zip(bundle._fields, bundle, kind.held.types, strict=True):
         if not isinstance(value, np.ndarray):
             codes = name in FIELDS
             found[at] = _symbol(called, value) if codes else _words(np.array([value]))[0]
@@ -208,11 +208,12 @@ def _constants(
         d = len(shape)
         numbers: dict[int, int] = {2: int(np.prod(shape)), 3: value.itemsize}
         numbers |= {5 + axis: size for axis, size in enumerate(shape)}
-        steps = (value.itemsize * int(np.prod(shape[axis + 1 :])) for axis in range(d))
-        numbers |= {5 + d + axis: step for axis, step in enumerate(steps)}
+        if held.layout == "C":
+            steps = (value.itemsize * int(np.prod(shape[axis + 1 :])) for axis in range(d))
+            numbers |= {5 + d + axis: step for axis, step in enumerate(steps)}
         # Numba's array: owner, its parent, elements, bytes of one, data, shape, strides.
         found |= {at + 8 * word: f"i64 {number}" for word, number in numbers.items()}
-        if not is_row and 0 < value.size <= LARGEST:
+        if held.layout == "C" and not is_row and 0 < value.size <= LARGEST:
             words = (
                 [_symbol(called, code) for code in value.tolist()]
                 if name in FIELDS
