@@ -158,6 +158,7 @@ SCENARIOS = (
 )  # fmt: skip
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("ego", ["route-follower", "reference"])
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_a_row_alone_has_the_bits_of_the_batch(driven, name, ego):

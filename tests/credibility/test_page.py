@@ -12,6 +12,7 @@ def dossier(made, tmp_path_factory):
     return bg.export_credibility([*made.values()], out=tmp_path_factory.mktemp("dossier") / "out")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("width", "scheme"), [(1440, "light"), (1440, "dark"), (390, "light"), (390, "dark")]
 )
@@ -33,6 +34,7 @@ def test_it_is_readable(dossier, browser, width, scheme):
     page.close()
 
 
+@pytest.mark.thorough
 def test_it_has_no_script_but_the_theme_and_all_that_the_record_says(dossier):
     text = without_theme(dossier.page.read_text("utf-8"))
     assert "<script" not in text

@@ -112,6 +112,7 @@ def test_several_groups_of_a_section_all_count(tmp_path):
     assert [condition.concept for condition in odd.conditions] == ["a", "b", "c", "d"]
 
 
+@pytest.mark.thorough
 @given(st.text(max_size=300) | st.binary(max_size=300).map(lambda data: data.decode("latin-1")))
 def test_any_text_is_read_or_refused_in_words(tmp_path_factory, text):
     folder = tmp_path_factory.mktemp("odd")

@@ -37,6 +37,7 @@ def test_the_page_is_beside_the_file(owl):
     assert "<title>it.owl: all-layers – BridgeGen</title>" in page.read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
 def test_a_scenario_of_the_catalogue_is_held_against_it(owl):
     edit(owl, r">all-layers</bg:has_name>", ">crossroads-s4</bg:has_name>")
     page, violations = show_file(owl)

@@ -308,6 +308,7 @@ def test_the_page_plays_the_worst_failure_of_each(folder, tmp_path):
     assert path.read_bytes() == write_suite_page(run, run.jobs).read_bytes()
 
 
+@pytest.mark.thorough
 def test_of_two_drivers_the_page_plays_both_where_something_changes(run):
     found = suite_difference(run)
     suite = data_of(write_suite_page(run, run.jobs).read_text("utf-8"))["suite"]
@@ -374,6 +375,7 @@ def test_no_playback_of_files_that_have_changed(run, folder):
     assert not any("motion" in one for entry in suite["entries"] for one in entry["results"])
 
 
+@pytest.mark.thorough
 def test_the_command_shows_the_failure_again(run, folder):
     by_name = {(job.entry.name, job.ego): job for job in run.jobs}
     plain = next(one for one in run.results if one.entry == "plain")

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.approval import refuses
@@ -106,6 +107,7 @@ def renumbered(section: model.LaneSection) -> model.LaneSection:
     )
 
 
+@pytest.mark.thorough
 @given(
     roads=st.lists(record(model.Road), min_size=1, max_size=2, unique_by=lambda road: road.id),
     data=st.data(),

@@ -82,6 +82,7 @@ def test_what_it_is_told_are_copies(cruising):
         np.testing.assert_array_equal(getattr(rollout, name), getattr(other, name), name)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "status", "message"),
     [
@@ -107,6 +108,7 @@ def test_a_failure_costs_the_row_that_it_belongs_to(cruising, name, status, mess
         assert np.isfinite(one).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -121,6 +123,7 @@ def test_what_is_no_driver_is_refused(name, message):
         made(name).warm_up()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("file", "name"), [("compiled_drivers.py", "looks_ahead"), ("drivers.py", "LooksAhead")]
 )
@@ -139,6 +142,7 @@ def test_a_replay_with_ideal_perception_is_just_that(file, name):
         np.testing.assert_array_equal(getattr(replayed, field), getattr(other, field), field)
 
 
+@pytest.mark.thorough
 def test_causes_are_found():
     pipeline = made("looks_ahead", causes=True)
     pipeline.choose_objective()
@@ -169,6 +173,7 @@ def test_no_rows_at_all(cruising):
     assert pipeline.rollout(rows(pipeline, 0)).shape[0] == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "of_class", "scenario"),
     [("lanes", "Lanes", "cut-in"), ("everything", "All", "red-light-runner")],
@@ -185,6 +190,7 @@ def test_it_gets_what_it_wants_as_a_class_does(name, of_class, scenario):
         )
 
 
+@pytest.mark.thorough
 def test_a_row_s_result_with_the_map_is_the_same_in_any_batch():
     pipeline = made("All", "crossroads-s4", file="wanting_drivers.py")
     X = rows(pipeline)

@@ -117,6 +117,7 @@ def test_the_same_bits_whatever_runs(monkeypatch, nothing_stored, name, ego, how
     assert not differing(in_specialised_code(make, monkeypatch), generic(make))
 
 
+@pytest.mark.thorough
 def test_another_process_compiles_it_while_rows_run(monkeypatch, nothing_stored):
     (make,) = batches("crossroads-s4", "route-follower", 8)
     wanted = generic(make)
